@@ -1,0 +1,26 @@
+"""Outcomes of a calculation: every member is a message a person can act on."""
+
+import enum
+
+
+class Result(enum.Enum):
+    """How a calculation ended; the value is the message."""
+
+    successful = "converged"
+    maximum_steps = "stopped at the largest number of iterations before it converged; the values may still move"
+    stalled = "no further improvement was possible from the last values; the start may lie in the wrong basin"
+    diverged = "the simulated motion left every bound; see the time of escape"
+
+    @property
+    def ok(self) -> bool:
+        """Whether the answer can be used without reserve."""
+        return self is Result.successful
+
+
+class DivergenceError(ArithmeticError):
+    """A free run left every bound; `time` and `state` say where."""
+
+    def __init__(self, message: str, time: float, state):
+        super().__init__(message)
+        self.time = time
+        self.state = state

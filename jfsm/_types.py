@@ -1,0 +1,58 @@
+"""Array helpers that every room may use: double precision is asked for once, here."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+X64_MESSAGE = 'float64 data would be narrowed to float32; run `jax.config.update("jax_enable_x64", True)` first.'
+
+
+def require_x64() -> None:
+    """Refuse to go on while JAX would silently narrow doubles.
+
+    Raises
+    ------
+    ValueError
+        If ``jax_enable_x64`` is off; the message is the line to run.
+    """
+    if not jax.config.jax_enable_x64:  # pyright: ignore[reportAttributeAccessIssue]
+        raise ValueError(X64_MESSAGE)
+
+
+def as_scalar(value: Any) -> Float[Array, ""]:
+    """Double-precision scalar from a number or a traced value."""
+    require_x64()
+    if isinstance(value, bool | str) or value is None:
+        raise TypeError(f"A parameter must be a real number; got {value!r}.")
+    if not isinstance(value, jax.Array):
+        number = np.asarray(value)
+        if number.dtype.kind not in "iuf" or number.ndim:
+            raise TypeError(f"A parameter must be one real number; got {value!r}.")
+        if not np.isfinite(number):
+            raise ValueError(f"A parameter must be finite; got {value!r}.")
+    return jnp.asarray(value, dtype=jnp.float64)
+
+
+def as_array(value: Any, name: str, ndim: int | tuple[int, ...]) -> np.ndarray:
+    """Finite float64 NumPy array of the expected number of axes.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `value` is not numeric, has other axes, or holds NaN or infinity; names the argument `name`.
+    """
+    require_x64()
+    array = np.asarray(value)
+    if array.dtype.kind not in "iufb":
+        raise TypeError(f"`{name}` must hold real numbers; got dtype {array.dtype}.")
+    allowed = (ndim,) if isinstance(ndim, int) else ndim
+    if array.ndim not in allowed:
+        raise ValueError(f"`{name}` must have {' or '.join(map(str, allowed))} axes; got shape {array.shape}.")
+    array = array.astype(np.float64)
+    if not np.all(np.isfinite(array)):
+        bad = int(np.sum(~np.isfinite(array)))
+        raise ValueError(f"`{name}` must be finite; {bad} of {array.size} values are NaN or infinite. Remove or fill them.")
+    return array

@@ -1,0 +1,6 @@
+"""What is wrong: candidates, evidence, gate, gain, verdict."""
+
+from ._diagnose import diagnose as diagnose
+from ._diagnosis import Diagnosis as Diagnosis
+from ._diagnosis import Estimate as Estimate
+from ._diagnosis import Finding as Finding

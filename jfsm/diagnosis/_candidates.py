@@ -1,0 +1,112 @@
+"""Hypotheses to be tried: every cause at every place where it could sit, with its starts."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from ..identification import (
+    Hypothesis,
+    Nuisances,
+    Unknown,
+    effect_unknown,
+    natural_size,
+    nuisance_unknowns,
+    own_unknown,
+    with_offsets,
+)
+from ..structures import Cause, Structure, causes
+
+_START = 0.1
+"""First guess of an effect as a share of the elastic force."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A cause at a place; `starts` are the structures that a fit begins from."""
+
+    cause: Cause
+    at: tuple
+    starts: tuple[Structure, ...]
+
+
+def chosen_causes(selection: Sequence[str | Cause] | None) -> dict[str, Cause]:
+    """The causes to try, by id.
+
+    Raises
+    ------
+    ValueError
+        If an id is not in the catalogue.
+    """
+    known = dict(causes())
+    if selection is None:
+        return known
+    found = {}
+    for item in selection:
+        if isinstance(item, Cause):
+            found[item.id] = item
+        elif item in known:
+            found[item] = known[item]
+        else:
+            raise ValueError(f"`causes` must name causes of the catalogue ({', '.join(known)}) or be jfsm.Cause objects; got {item!r}.")
+    return found
+
+
+def candidates(
+    model: Structure, records: Sequence[Nuisances], selection: Mapping[str, Cause], places: Sequence[tuple] | None = None
+) -> list[Candidate]:
+    """Every cause of `selection` at every place: link laws on the model's links, sensor effects on the channels."""
+    found = []
+    driven = any(channel[0] == "force" for n in records for channel in n.record.channels)
+    for cause in selection.values():
+        if cause.is_sensor:
+            kind = cause.effect.channel
+            channels = dict.fromkeys(c for n in records for c in n.record.channels if c[0] == kind)
+            if not driven:  # without a force every sensor's scale is free
+                continue
+            spots: list[tuple] = list(channels)
+        else:
+            spots = list(model.links) if places is None else list(places)
+        for at in spots:
+            found.append(Candidate(cause, tuple(at), _starts(model, cause, at, records[0])))
+    return found
+
+
+def _starts(model: Structure, cause: Cause, at: tuple, nuisances: Nuisances) -> tuple[Structure, ...]:
+    signs = (cause.sign,) if cause.sign else (1, -1)
+    structures = []
+    for sign in signs:
+        parameter = cause.effect.parameters[0]
+        unit = cause.effect(**{p.name: float(sign) for p in cause.effect.parameters}, at=at)
+        extended = model + unit
+        path = next(p for p in reversed(extended.entries()) if p.startswith(f"{unit.kind}@") and p.split(".")[1].startswith(parameter.name))
+        structures.append(extended.with_values({path: sign * _START * natural_size(extended, path, nuisances)}))
+    return tuple(structures)
+
+
+def own_paths(model: Structure, records: Sequence[Nuisances]) -> tuple[str, ...]:
+    """The model's own values that a refit may change.
+
+    Without any force only ratios show, so masses stay as stated. Values of zero have nothing to be relative to.
+    """
+    driven = any(n.fine.force.any() or n.fine.base.any() for n in records)
+    values = model.values()
+    return tuple(p for p in model.entries() if values[p] != 0 and (driven or not p.startswith("mass@")))
+
+
+def hypothesis(
+    model: Structure, starts: Sequence[Structure], records: Sequence[Nuisances], *, refit: bool = True
+) -> Hypothesis:
+    """Starts with their unknowns: the model's own values, the effect's numbers, and each record's nuisances."""
+    structures, unknowns = [], []
+    trust = dict(model.trust)
+    given = set(model.entries())
+    own = own_paths(model, records) if refit else ()
+    for start in starts:
+        effect = [p for p in start.entries() if p not in given]
+        structure = with_offsets(start, records)
+        mine: list[Unknown] = [own_unknown(structure, p, trust) for p in own]
+        mine += [effect_unknown(structure, p, records[0]) for p in effect]
+        for index, nuisances in enumerate(records):
+            mine += nuisance_unknowns(structure, nuisances, index)
+        structures.append(structure)
+        unknowns.append(tuple(mine))
+    return Hypothesis(tuple(structures), tuple(unknowns))

@@ -1,0 +1,136 @@
+"""From trials to a verdict.
+
+A cause must do three things: be more probable than its absence, explain at least half of the power that a refit of the
+model leaves, and do so on every set of samples, held-out ones included. Where the winner leaves nothing but noise, its
+evidence is trusted as it stands; where it does not, evidence counts no more than some tens of independent looks.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ._trial import Trial
+
+GATE = 0.5
+"""Share of the excess power that a cause explains, at least."""
+SIGNIFICANT = 5.0
+"""Nats by which something must beat nothing."""
+NEGLIGIBLE = 0.02
+"""Excess, as a share of the signal, below which nothing but a perfect explanation is a finding."""
+_NOTICEABLE = 0.1
+"""Excess, as a share of the power that noise leaves, from which a set says anything about an effect."""
+_WHITE = 0.1
+_SCALE = 0.5
+_LOOKS = (10.0, 40.0)
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Verdict and winning trial; probability of every alternative and reason for every candidate, in their order."""
+
+    verdict: str
+    winner: Trial
+    probability: dict[int, float]
+    kappa: dict[int, float]
+    why: dict[int, str]
+
+    def share(self, trial: Trial) -> float:
+        """Probability of a trial; 0 for one that is no alternative."""
+        return self.probability.get(id(trial), 0.0)
+
+
+def adequate(trial: Trial) -> bool:
+    """Whether a trial leaves nothing but noise: white innovations of the size of the floor, no excess."""
+    excess = math.sqrt(float(np.max(trial.prediction.excess)))
+    scales = np.abs(trial.noise[trial.trusted])
+    return trial.whiteness < _WHITE and bool(np.all(scales < _SCALE)) and excess < NEGLIGIBLE
+
+
+def explained(trial: Trial, baseline: Trial) -> float:
+    """Smallest share of the baseline's excess power that a trial explains, over the sets where there is any."""
+    start, left = baseline.prediction.excess, trial.prediction.excess
+    significant = start > np.maximum(_NOTICEABLE * baseline.prediction.expected, 1e-9)
+    if not np.any(significant):
+        return 0.0
+    return float(np.min(1.0 - left[significant] / start[significant])) if np.all(np.isfinite(left)) else -math.inf
+
+
+def probabilities(trials: Sequence[Trial], periods: float) -> np.ndarray:
+    """Probability of each trial among them."""
+    evidence = np.array([t.evidence for t in trials])
+    best = trials[int(np.argmax(evidence))]
+    if adequate(best):
+        score = evidence / 2  # tempered: noise levels and priors are known to some ten per cent only
+    else:
+        looks = min(max(periods / 5, _LOOKS[0]), _LOOKS[1])
+        error = np.array([math.sqrt(float(np.mean(t.prediction.error))) for t in trials])
+        size = np.array([len(t.unknowns) for t in trials])
+        score = -looks * np.log(error) - 0.5 * size * math.log(looks)
+    share = np.exp(score - np.max(score))
+    return 0.995 * share / np.sum(share) + 0.005 / len(trials)
+
+
+def decide(given: Trial, refitted: Trial, tried: Sequence[Trial], mapped: Trial | None, periods: float) -> Decision:
+    """Verdict over the model as given, the model refitted, every candidate, and a map that stands for any law."""
+    kappa, why = {}, {}
+    nothing = max(given.evidence, refitted.evidence)
+    passing = []
+    for t in tried:
+        kappa[id(t)] = explained(t, refitted)
+        why[id(t)] = _reason(t, kappa[id(t)], explained(t, given), t.evidence - nothing)
+        if not why[id(t)]:
+            passing.append(t)
+    alternatives = [given, refitted, *passing]
+    share = probabilities(alternatives, periods)
+    chance = {id(t): float(p) for t, p in zip(alternatives, share, strict=True)}
+    winner = alternatives[int(np.argmax(share))]
+    for t in passing:
+        if t is not winner:
+            why[id(t)] = f"explains it too, but is {winner.evidence - t.evidence:.1f} nats less probable than the best"
+    verdict = _verdict(given, refitted, winner, tried, mapped)
+    if verdict == "cause" and chance[id(winner)] < 0.5:
+        families = [t for t in passing if t.cause is not None and winner.cause is not None and t.cause.family == winner.cause.family]
+        if sum(chance[id(t)] for t in families) < 0.8:
+            verdict = "undecided"
+    if verdict == "consistent":
+        winner = given
+    elif verdict == "unnamed" and mapped is not None:
+        winner = mapped
+        kappa[id(mapped)] = explained(mapped, refitted)
+    elif verdict == "undecided" and winner.cause is not None:
+        winner = refitted
+    return Decision(verdict, winner, chance, kappa, why)
+
+
+def _reason(t: Trial, over_refit: float, over_given: float, better: float) -> str:
+    """Why a candidate is no alternative, or nothing."""
+    if not math.isfinite(t.evidence) or over_refit == -math.inf:
+        return "its motion runs away"
+    if better <= SIGNIFICANT:
+        return f"is not more probable than the model's own values refitted ({better:+.1f} nats)"
+    if over_refit >= GATE or (adequate(t) and over_given >= GATE):
+        return ""
+    return f"explains {max(over_refit, 0.0):.0%} of what a refit leaves; half is the least for a cause"
+
+
+def _verdict(given: Trial, refitted: Trial, winner: Trial, tried: Sequence[Trial], mapped: Trial | None) -> str:
+    def leaves(t: Trial) -> float:
+        return math.sqrt(float(np.max(t.prediction.excess)))
+
+    clean = adequate(winner)
+    if winner.evidence - given.evidence < SIGNIFICANT and (clean or leaves(given) < NEGLIGIBLE):
+        return "consistent"
+    if leaves(given) < NEGLIGIBLE and not clean:
+        return "consistent"
+    if clean:
+        return "parameters" if winner is refitted else "cause" if winner.cause else "consistent"
+    stands_in = mapped is not None and mapped.evidence - winner.evidence > 2 * SIGNIFICANT and explained(mapped, winner) >= GATE
+    if winner.cause is not None:
+        return "unnamed" if stands_in else "cause"
+    if stands_in:
+        return "unnamed"
+    if winner is refitted and explained(refitted, given) >= GATE and leaves(refitted) < 2 * NEGLIGIBLE:
+        return "parameters"
+    return "undecided"

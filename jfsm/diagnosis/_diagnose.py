@@ -1,0 +1,179 @@
+"""From a record and a model to a verdict."""
+
+import math
+import secrets
+from collections.abc import Callable, Iterator, Sequence
+
+import jax
+import numpy as np
+
+from .._types import require_x64
+from ..identification import Hypothesis, Nuisances, Posterior, maximise, prepare
+from ..records import Record
+from ..structures import Cause, Structure
+from ._candidates import Candidate, candidates, chosen_causes, hypothesis
+from ._decide import Decision, decide
+from ._diagnosis import Diagnosis
+from ._gain import measure_gain
+from ._report import assemble
+from ._trial import Trial, trial
+
+Progress = Callable[[str, int, int], None]
+
+RECONSTRUCTIONS = ("band-limited", "linear", "hold")
+
+
+def diagnose(
+    record: Record | Sequence[Record],
+    model: Structure,
+    holdout: float | Record | Sequence[Record] | None = 0.3,
+    causes: Sequence[str | Cause] | None = None,
+    max_causes: int = 1,
+    key: jax.Array | None = None,
+    *,
+    places: Sequence[tuple[int, int]] | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """What `model` gets wrong about `record`, the name of the cause, and the gain of mending it.
+
+    Parameters
+    ----------
+    record : Record or sequence of them
+        One verdict that must hold on all.
+    model : Structure
+        The simulation that its owner believes in. Its own values are refitted within its trust (`Structure.uncertain`).
+    holdout : float, Record, sequence of Records, or None
+        A share is the last part in time; records are never fitted; None decides on the whole record and gives no gain.
+    causes : sequence of ids or causes, optional
+        What to look for; the whole catalogue by default.
+    max_causes : int
+        Effects that may act at once; 1 here.
+    key : jax.random.key, optional
+        Source of the few draws (the floor of the gain); made at the call when None.
+    places : sequence of links, optional
+        Where link laws are tried; the model's links by default.
+    progress : callable, optional
+        Told of every step: what, steps done, steps in all.
+
+    Returns
+    -------
+    Diagnosis
+
+    Raises
+    ------
+    ValueError
+        If the record cannot be used, does not fit the model, or an argument is out of its range.
+    """
+    require_x64()
+    if max_causes != 1:
+        if max_causes < 1:
+            raise ValueError(f"`max_causes` must be at least 1; got {max_causes}.")
+    key = jax.random.key(secrets.randbits(32)) if key is None else key
+    training, held = split(record, holdout)
+    chosen = chosen_causes(causes)
+    whole = [whole for whole, _ in training]
+    until = [fit for _, fit in training]
+    records = _prepare(whole, until, model)
+    tried = candidates(model, records, chosen, places)
+    steps = _Steps(progress, 4 + len(tried))
+
+    steps.next("the model as given")
+    given = _fit(Candidate, "given", model, records, until, refit=False)
+    steps.next("the model refitted")
+    refitted = _fit(Candidate, "refitted", model, records, until, refit=True)
+    trials = []
+    best = min(given.value, refitted.value)
+    for candidate in tried:
+        steps.next(f"{candidate.cause.label} at {candidate.at}")
+        trials += list(_try(candidate, model, records, until, best))
+        best = min(best, *(t.value for t in trials))
+    trials = _best_of_each(trials)
+    steps.next("a map that stands for any law")
+    periods = sum(n.record.duration for n in records) * records[0].omega / (2 * math.pi)
+    decision = decide(given, refitted, trials, None, periods)
+    steps.next("the gain on held-out readings")
+    return _conclude(decision, given, refitted, trials, model, records, held, key)
+
+
+class _Steps:
+    """Counts steps for a progress display."""
+
+    def __init__(self, progress: Progress | None, total: int):
+        self.progress, self.done, self.total = progress, 0, total
+
+    def next(self, what: str) -> None:
+        if self.progress is not None:
+            self.progress(what, self.done, self.total)
+        self.done += 1
+
+
+def split(record: Record | Sequence[Record], holdout) -> tuple[list[tuple[Record, int]], list[Record]]:
+    """Records with the number of their samples that are fitted, and the records on which the gain is measured."""
+    records = [record] if isinstance(record, Record) else list(record)
+    if not records:
+        raise ValueError("`record` must hold at least one record; the sequence is empty.")
+    for item in records:
+        if not isinstance(item, Record):
+            raise TypeError(f"`record` must be a jfsm.Record or a sequence of them; got {type(item).__name__}.")
+    if holdout is None:
+        return [(r, len(r)) for r in records], []
+    if isinstance(holdout, Record):
+        return [(r, len(r)) for r in records], [holdout]
+    if isinstance(holdout, int | float):
+        if not 0 < holdout < 1:
+            raise ValueError(f"`holdout` as a share must lie between 0 and 1, e.g. 0.3; got {holdout}. None keeps nothing back.")
+        ends = [int(round((1 - holdout) * len(r))) for r in records]
+        return list(zip(records, ends, strict=True)), [r[end:] for r, end in zip(records, ends, strict=True)]
+    return [(r, len(r)) for r in records], list(holdout)
+
+
+def _prepare(records: Sequence[Record], until: Sequence[int], model: Structure) -> list[Nuisances]:
+    """Nuisances of every record; how the drive runs between its samples is chosen once, on the model refitted."""
+    first = [prepare(r, model) for r in records]
+    return first
+
+
+def _fit(_, name: str, model: Structure, records, until, *, refit: bool) -> Trial:
+    posterior = Posterior(hypothesis(model, [model], records, refit=refit), records, until)
+    return trial(posterior, maximise(posterior), 0, None, (name,))
+
+
+def _try(candidate: Candidate, model: Structure, records, until, best: float) -> Iterator[Trial]:
+    posterior_of = lambda starts: Posterior(hypothesis(model, starts, records), records, until)  # noqa: E731
+    sticks = hasattr(candidate.cause.effect, "limits")
+    groups = [[s] for s in candidate.starts] if sticks else [list(candidate.starts)]
+    for starts in groups:
+        posterior = posterior_of(starts)
+        found = maximise(posterior, best=best)
+        for lane in range(posterior.lanes):
+            yield trial(posterior, found, lane, candidate.cause, candidate.at)
+
+
+def _best_of_each(trials: Sequence[Trial]) -> list[Trial]:
+    """The most probable start of every cause at every place."""
+    best: dict[tuple, Trial] = {}
+    for t in trials:
+        name = (t.name, t.at)
+        if name not in best or t.evidence > best[name].evidence:
+            best[name] = t
+    return list(best.values())
+
+
+def _conclude(decision: Decision, given: Trial, refitted: Trial, trials, model, records, held, key) -> Diagnosis:
+    extended = {"consistent": model}.get(decision.verdict, decision.winner.structure)
+    gain, curves = (None, [])
+    if held:
+        first = records[0]
+        noise = _noise_levels(decision.winner, first)
+        gain, curves = measure_gain(model, refitted.structure, extended, held, noise, first.omega, first.reconstruction, key)
+    return assemble(decision, given, refitted, trials, model, extended, records, gain, curves)
+
+
+
+
+def _noise_levels(winner: Trial, nuisances: Nuisances) -> dict[tuple, float]:
+    """Standard deviation of the noise of every channel: of responses as the winner found it, of forces at their floor."""
+    levels = {c: float(f * math.exp(s / 2)) for c, f, s in zip(nuisances.channels, nuisances.floor, winner.noise, strict=False)}
+    for j, variance in enumerate(nuisances.noise.force_variance):
+        levels["force", j + 1] = math.sqrt(float(variance))
+    return levels

@@ -1,0 +1,103 @@
+"""The outcome of a diagnosis, as a value."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..structures import Structure
+from ._gain import Gain
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value with its 95 % interval and unit."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One named cause, or one own value that is wrong."""
+
+    cause: str
+    family: str
+    at: tuple
+    probability: float
+    parameters: dict[str, Estimate]
+    rivals: tuple["Rival", ...] = ()
+    sentence: str = ""
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another cause that this record cannot rule out."""
+
+    cause: str
+    at: tuple
+    probability: float
+
+
+@dataclass(frozen=True)
+class CandidateResult:
+    """A candidate that was tried.
+
+    `evidence` counts in nats from the refitted model, `error` is its multi-step prediction error per set as a share of
+    the signal, `kappa` the smallest share of the refit's excess power that it explains, `why` the reason in words.
+    """
+
+    cause: str
+    at: tuple
+    evidence: float
+    error: dict[str, float]
+    kappa: float
+    probability: float
+    parameters: dict[str, Estimate]
+    why: str
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What is wrong, why, how sure, and what mending it is worth; see the fields' own classes."""
+
+    verdict: str
+    findings: tuple[Finding, ...]
+    candidates: tuple[CandidateResult, ...]
+    extended: Structure
+    refitted: dict[str, Estimate]
+    gain: Gain | None
+    detectable: dict[str, Estimate]
+    noise: dict[str, float]
+    notes: tuple[str, ...]
+    sentence: str
+    advice: str
+    data: dict[str, Any]
+    """Everything that `to_json` writes and the page shows, as plain types."""
+
+    def print(self) -> None:
+        """Verdict, findings and gain on the terminal."""
+        from ..reporting import print_diagnosis
+
+        print_diagnosis(self.data)
+
+    def plot(self) -> Any:
+        """The pictures of the report as one matplotlib figure."""
+        from ..reporting import plot_diagnosis
+
+        return plot_diagnosis(self.data)
+
+    def report(self, path: str | Path) -> None:
+        """Write a self-contained HTML page; the file appears whole or not at all."""
+        from ..reporting import render_page, write_text_atomically
+
+        write_text_atomically(Path(path), render_page(self.data))
+
+    def to_json(self, path: str | Path) -> None:
+        """Write every number of the verdict as JSON."""
+        import json
+
+        from ..reporting import write_text_atomically
+
+        write_text_atomically(Path(path), json.dumps(self.data, indent=1, allow_nan=False))

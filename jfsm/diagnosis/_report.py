@@ -1,0 +1,180 @@
+"""A decision put into values, words and plain data."""
+
+import math
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+from ..identification import Nuisances
+from ..structures import PARAMETER_CAUSES, Structure
+from ._decide import Decision
+from ._diagnosis import CandidateResult, Diagnosis, Estimate, Finding, Rival
+from ._gain import Gain
+from ._trial import Trial
+
+_RIVAL = 0.02
+"""Probability from which another cause is listed as a rival."""
+_SHOWN = 2000
+"""Points of a curve in the report."""
+
+
+def assemble(
+    decision: Decision, given: Trial, refitted: Trial, trials: list[Trial], model: Structure, extended: Structure, records: list[Nuisances], gain: Gain | None, curves: list[dict]
+) -> Diagnosis:
+    """The diagnosis, with everything that the report needs."""
+    units = records[0].record.units
+    findings = _findings(decision, trials, model, units)
+    candidates = tuple(_candidate(t, decision, refitted, model, units) for t in sorted(trials, key=lambda t: -t.evidence))
+    winner = decision.winner if decision.winner.at != ("given",) else refitted
+    refit = {p: _estimate(winner, p, model, units) for p in model.entries() if any(u.path == p for u in winner.unknowns)}
+    notes = tuple(dict.fromkeys(note for n in records for note in n.notes))
+    noise = {f"{kind} {j}": float(s) for n in records[:1] for (kind, j), s in zip(n.channels, n.floor, strict=True)}
+    sentence, advice = _words(decision, findings, gain)
+    data = {
+        "jfsm": _version(),
+        "verdict": decision.verdict,
+        "sentence": sentence,
+        "advice": advice,
+        "record": _record(records),
+        "model": model.describe(units),
+        "extended": extended.describe(units),
+        "findings": [_plain(f) for f in findings],
+        "candidates": [_plain(c) for c in candidates],
+        "refitted": {p: {"given": model.values()[p], **_plain(e)} for p, e in refit.items()},
+        "gain": None if gain is None else _gain(gain),
+        "notes": list(notes),
+        "detectable": {},
+        "curves": {"holdout": _holdout(curves)},
+    }
+    return Diagnosis(
+        verdict=decision.verdict, findings=findings, candidates=candidates, extended=extended, refitted=refit, gain=gain,
+        detectable={}, noise=noise, notes=notes, sentence=sentence, advice=advice, data=data,
+    )  # fmt: skip
+
+
+def _version() -> str:
+    try:
+        return version("jfsm")
+    except PackageNotFoundError:  # run from a source tree that is not installed
+        return "unknown"
+
+
+def _unit(structure: Structure, path: str, units) -> str:
+    return structure.entries()[path][0].unit(units["force"], units["displacement"])
+
+
+def _estimate(t: Trial, path: str, model: Structure, units) -> Estimate:
+    value, low, high = t.interval(path)
+    return Estimate(value, low, high, _unit(t.structure, path, units))
+
+
+def _effect(t: Trial, model: Structure, units) -> dict[str, Estimate]:
+    own = set(model.entries())
+    paths = [u.path for u in t.unknowns if u.record is None and u.path not in own]
+    return {p.split(".")[-1].split("#")[0]: _estimate(t, p, model, units) for p in paths}
+
+
+def _findings(decision: Decision, trials: list[Trial], model: Structure, units) -> tuple[Finding, ...]:
+    winner = decision.winner
+    if decision.verdict == "cause" and winner.cause is not None:
+        rivals = tuple(
+            Rival(t.name, t.at, decision.share(t)) for t in sorted(trials, key=decision.share, reverse=True) if t is not winner and decision.share(t) > _RIVAL
+        )
+        parameters = _effect(winner, model, units)
+        cause = winner.cause
+        return (Finding(cause.id, cause.family, winner.at, decision.share(winner), parameters, rivals, cause.sentence),)
+    if decision.verdict == "parameters":
+        return _wrong_values(winner, decision.share(winner), model, units)
+    return ()
+
+
+def _wrong_values(t: Trial, probability: float, model: Structure, units) -> tuple[Finding, ...]:
+    """Own values that moved by more than their error and than a third of what they are trusted to."""
+    found = []
+    for k, u in enumerate(t.unknowns):
+        if u.record is not None or u.path not in model.entries():
+            continue
+        moved, sd = abs(t.theta[k] - u.center), math.sqrt(max(t.covariance[k, k], 0.0))
+        kind, place = u.path.split(".")[0].split("@")
+        if kind in PARAMETER_CAUSES and moved > 3 * sd and moved > u.width / 3:
+            at = tuple(int(p) for p in place.split("-"))
+            name = u.path.split(".")[-1] if "." in u.path else "mass"
+            sentence = f"{kind} is off: stated {model.values()[u.path]:.6g}, found {t.interval(u.path)[0]:.6g}"
+            found.append((moved / u.width, Finding(PARAMETER_CAUSES[kind], "parameters", at, probability, {name: _estimate(t, u.path, model, units)}, (), sentence)))
+    return tuple(f for _, f in sorted(found, key=lambda item: -item[0]))
+
+
+def _candidate(t: Trial, decision: Decision, refitted: Trial, model: Structure, units) -> CandidateResult:
+    error = np.sqrt(t.prediction.error)
+    names = ["training", "holdout"] if error.size == 2 else [f"set {i + 1}" for i in range(error.size)]
+    why = decision.why.get(id(t), "") or ("named" if t is decision.winner else "")
+    return CandidateResult(
+        t.name, t.at, t.evidence - refitted.evidence, {n: float(e) for n, e in zip(names, error, strict=True)},
+        decision.kappa.get(id(t), 0.0), decision.share(t), _effect(t, model, units), why,
+    )  # fmt: skip
+
+
+def _words(decision: Decision, findings: tuple[Finding, ...], gain: Gain | None) -> tuple[str, str]:
+    share = "" if gain is None else f" The free-run error on held-out readings goes from {gain.before:.2%} to {gain.after:.2%} of the signal."
+    if decision.verdict == "consistent":
+        return "The record shows nothing beyond noise that the model lacks.", "Keep the model as it is."
+    if decision.verdict == "parameters":
+        what = "; ".join(f.sentence for f in findings) or "its own values moved together"
+        return f"The form of the model is right, its values are off: {what}.{share}", "Use the refitted values."
+    if decision.verdict == "cause":
+        f = findings[0]
+        where = "-".join(str(a) for a in f.at)
+        return f"The model lacks {decision.winner.cause.label} at {where}: {f.sentence}.{share}", "Use the extended model."  # pyright: ignore
+    if decision.verdict == "unnamed":
+        return f"A real effect is there that no catalogue entry explains; a map stands in.{share}", "Look at the map's shape; record a second run with another amplitude."
+    return "Something is wrong beyond noise, and this record cannot tell what.", "Record a second run with another amplitude, or measure the missing channels."
+
+
+def _record(records: list[Nuisances]) -> dict[str, Any]:
+    first = records[0]
+    record = first.record
+    channels = [
+        {"name": f"{kind} {j}", "unit": record.units[kind], "rms": float(s), "noise": float(f)}
+        for (kind, j), s, f in zip(first.channels, first.spread, first.floor, strict=True)
+    ]
+    return {"name": record.name, "samples": sum(n.samples for n in records), "sample_rate": 1 / record.dt, "duration": record.duration, "channels": channels}
+
+
+def _gain(gain: Gain) -> dict[str, Any]:
+    channels = {}
+    for name, c in gain.channels.items():
+        row = {"unit": c.unit, "closed": c.closed}
+        for key in ("before", "refitted", "after", "floor"):
+            row[key], row[f"{key}_nrmse"] = getattr(c, key), getattr(c, key) / c.spread
+        channels[name] = row
+    return {"closed": gain.closed, "before": gain.before, "refitted": gain.refitted, "after": gain.after, "floor": gain.floor, "channels": channels}
+
+
+def _holdout(curves: list[dict]) -> dict[str, Any] | None:
+    if not curves:
+        return None
+    record, before, after = (curves[0][k] for k in ("record", "before", "after"))
+    take = slice(0, _SHOWN)
+    channels = {
+        f"{c[0]} {c[1]}": {"unit": record.units[c[0]], "measured": _list(y[take]), "before": _list(before[c][take]), "after": _list(after[c][take])}
+        for c, y in record.responses.items()
+    }
+    return {"time": _list(record.time[take]), "channels": channels}
+
+
+def _list(values) -> list:
+    return [float(v) if math.isfinite(v) else None for v in np.asarray(values).ravel()]
+
+
+def _plain(value: Any) -> Any:
+    """Dataclasses, tuples and NumPy numbers as plain types."""
+    if hasattr(value, "__dataclass_fields__"):
+        return {name: _plain(getattr(value, name)) for name in value.__dataclass_fields__}
+    if isinstance(value, dict):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    return value

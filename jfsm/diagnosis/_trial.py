@@ -1,0 +1,139 @@
+"""One hypothesis fitted: its values, its evidence, and how well it predicts."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..identification import Hypothesis, Maximum, Nuisances, Posterior, Unknown
+from ..structures import Cause, Structure
+
+_FILTERED, _PREDICTED = 2.0, 3.0
+"""Periods of filtering before, and of free prediction in, every window."""
+_SLACKS = (0.0, 0.01, 0.05)
+"""How loosely the state may be held while it is filtered; each hypothesis is judged by its best."""
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Free prediction over some periods, in units of each channel's spread, squared and summed over channels.
+
+    `error` is what was seen, `expected` what noise alone would leave; both per set (training, held out, ...).
+    """
+
+    error: np.ndarray
+    expected: np.ndarray
+
+    @property
+    def excess(self) -> np.ndarray:
+        """Power beyond noise, per set."""
+        return np.maximum(self.error - self.expected, 0.0)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A hypothesis at its best values."""
+
+    cause: Cause | None
+    at: tuple
+    structure: Structure
+    unknowns: tuple[Unknown, ...]
+    theta: np.ndarray
+    covariance: np.ndarray
+    evidence: float
+    value: float
+    converged: bool
+    prediction: Prediction
+    whiteness: float
+    noise: np.ndarray
+    trusted: np.ndarray
+
+    @property
+    def name(self) -> str:
+        """Cause id, or what the hypothesis is."""
+        return self.cause.id if self.cause else str(self.at[0])
+
+    def interval(self, path: str, width: float = 1.96) -> tuple[float, float, float]:
+        """Value, low and high of an unknown; symmetric in its own coordinate."""
+        k = next(i for i, u in enumerate(self.unknowns) if u.path == path)
+        u, t, sd = self.unknowns[k], self.theta[k], float(np.sqrt(max(self.covariance[k, k], 0.0)))
+        ends = sorted((u.value(t - width * sd), u.value(t + width * sd)))
+        return u.value(t), ends[0], ends[1]
+
+
+def sets(nuisances: Nuisances, until: int) -> list[np.ndarray]:
+    """Sample masks of the sets on which a record is judged: training and held out, or contiguous quarters."""
+    n = nuisances.samples
+    index = np.arange(n)
+    if until < n:
+        return [index < until, index >= until]
+    return [index * 4 // n == q for q in range(4)]
+
+
+def predict(posterior: Posterior, theta: np.ndarray) -> Prediction:
+    """Multi-step prediction of a hypothesis with one start."""
+    best: list[tuple[float, np.ndarray, np.ndarray]] = []
+    for slack in _SLACKS:
+        errors, expected = [], []
+        for index, nuisances in enumerate(posterior.records):
+            use, scored = _windows(nuisances)
+            found = posterior.innovations(theta, index, use=use, noise_scales=False, slack=slack)
+            truth = found if slack == 0 else posterior.innovations(theta, index, use=use, noise_scales=False)
+            alive = np.asarray(nuisances.readings.use)[: nuisances.samples] > 0
+            for chosen in sets(nuisances, posterior.until[index]):
+                mask = (scored & chosen)[:, None] & alive
+                count = np.maximum(mask.sum(0), 1)
+                errors.append(np.sum(np.sum(np.where(mask, found.error**2, 0.0), 0) / count / nuisances.spread**2))
+                expected.append(np.sum(np.sum(np.where(mask, truth.variance, 0.0), 0) / count / nuisances.spread**2))
+        error = np.nan_to_num(np.array(errors), nan=np.inf)
+        best.append((float(np.sum(error)), error, np.array(expected)))
+    _, error, expected = min(best, key=lambda item: item[0])
+    return Prediction(error, expected)
+
+
+def _windows(nuisances: Nuisances) -> tuple[np.ndarray, np.ndarray]:
+    """Which samples the filter uses, and which it predicts freely."""
+    n, period = nuisances.samples, 2 * np.pi / (nuisances.omega * nuisances.record.dt)
+    period = min(period, n / (2 * (_FILTERED + _PREDICTED)))
+    phase = np.arange(n) % max(int(round((_FILTERED + _PREDICTED) * period)), 2)
+    free = phase >= int(round(_FILTERED * period))
+    channels = len(nuisances.channels)
+    return np.repeat((~free)[:, None], channels, 1).astype(float), free
+
+
+def whiteness(posterior: Posterior, theta: np.ndarray) -> float:
+    """Largest lag-one correlation of the innovations of any channel over the samples that were fitted."""
+    worst = 0.0
+    for index, nuisances in enumerate(posterior.records):
+        found = posterior.innovations(theta, index)
+        r = (found.error / np.sqrt(found.variance))[1 : posterior.until[index]]
+        alive = np.asarray(nuisances.readings.use)[1 : posterior.until[index]] > 0
+        r = np.where(alive, r, 0.0)
+        worst = max(worst, float(np.max(np.abs(np.sum(r[1:] * r[:-1], 0) / np.maximum(np.sum(r * r, 0), 1e-300)))))
+    return worst
+
+
+def trial(posterior: Posterior, maximum: Maximum, lane: int, cause: Cause | None, at: tuple) -> Trial:
+    """The lane of a fit as a trial."""
+    hypothesis = posterior.hypothesis
+    alone = posterior if posterior.lanes == 1 else Posterior(
+        Hypothesis((hypothesis.structures[lane],), (hypothesis.unknowns[lane],)), posterior.records, posterior.until
+    )
+    theta, unknowns = maximum.theta[lane], hypothesis.unknowns[lane]
+    scales = np.array([t for u, t in zip(unknowns, theta, strict=True) if u.path.startswith("noise@")])
+    return Trial(
+        cause=cause,
+        at=at,
+        structure=alone.structure(theta),
+        unknowns=unknowns,
+        theta=theta,
+        covariance=np.linalg.pinv(maximum.information[lane], hermitian=True),
+        evidence=maximum.evidence(lane),
+        value=float(maximum.value[lane]),
+        converged=maximum.results[lane].ok,
+        prediction=predict(alone, theta),
+        whiteness=whiteness(alone, theta),
+        noise=scales,
+        trusted=np.concatenate([n.trusted for n in posterior.records]),
+    )
+
+

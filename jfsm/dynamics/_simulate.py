@@ -1,0 +1,173 @@
+"""Free runs of a structure, driven by what a record says drove it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from .._result import Result
+from .._types import require_x64
+from ..records import Record
+from ..structures import Structure
+from ._drive import Reconstruction
+from ._excitation import bucket, excitation, substeps_for
+from ._grid import run_grid
+from ._plant import Plant, lower
+from ._reference import run_reference
+from ._start import starting_state
+
+_FRICTION_SUBSTEPS = 4
+"""Steps per sample at least where something sticks; the error falls with the fourth power."""
+_BOUND = 1e6
+"""A motion this many times larger than anything that was measured or could be driven has escaped."""
+
+
+@dataclass(frozen=True)
+class Response:
+    """Motion of a free run, in the record's datum.
+
+    Attributes
+    ----------
+    time : (n,) array
+        Instants [s] on the record's clock. A run that diverges ends before its escape, so n may be less than the
+        record's.
+    displacement, velocity, acceleration : (n, dof) arrays
+        Displacement and velocity relative to the base, acceleration absolute; offsets of the channels included.
+    result : Result
+        How the run ended.
+    escape_time : float or None
+        Instant [s] at which the motion left every bound.
+    """
+
+    time: np.ndarray
+    displacement: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    result: Result
+    escape_time: float | None
+    _gains: Mapping[tuple[str, int], float]
+
+    def readings(self, record: Record) -> dict[tuple[str, int], np.ndarray]:
+        """What the sensors of `record` would show, by channel (kind, degree of freedom): gains applied."""
+        return {
+            key: getattr(self, key[0])[:, key[1] - 1] * (1.0 + self._gains.get(key, 0.0)) for key in record.responses
+        }
+
+
+def simulate(
+    model: Structure,
+    record: Record,
+    initial_state: Any = None,
+    *,
+    window: int = 50,
+    reconstruction: Reconstruction = "band-limited",
+    solver: Literal["reference", "grid"] = "reference",
+    tolerance: float = 1e-8,
+) -> Response:
+    """Free run of `model` under the force (or base motion) of `record`.
+
+    Parameters
+    ----------
+    model : Structure
+    record : Record
+        Its response, if any, is used for the initial state only.
+    initial_state : pair of (dof,) arrays, optional
+        Displacement and velocity at the first sample. Without it: rest if the record says so; else least squares of
+        the structure over the first `window` samples of whatever response there is; else rest.
+    window : int
+    reconstruction : "band-limited", "linear" or "hold"
+        The force between its samples.
+    solver : "reference" or "grid"
+        ``"reference"``: Tsitouras' 5(4) with step control at `tolerance` where nothing sticks. ``"grid"``: fixed
+        Runge-Kutta steps with located reversals, as the likelihood uses; always where something sticks.
+    tolerance : float
+        Relative, per step, of the motion's size.
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    ValueError
+        If the record names a degree of freedom that the structure lacks, its time is uneven, a mass is zero, or
+        `initial_state` has the wrong shape.
+    """
+    require_x64()
+    check_pair(model, record)
+    friction = bool(len(lower(model).friction))
+    substeps = substeps_for(model, record.dt)
+    substeps = max(substeps, _FRICTION_SUBSTEPS) if friction else 2 * substeps
+    channels = tuple(record.responses)
+    plant = lower(model, channels)
+    fine = excitation(record, model.dof, substeps, reconstruction, length=bucket(len(record)))
+    x0, v0 = starting_state(model, record, initial_state, window=window, reconstruction=reconstruction)
+    # The grid run is cheap, and tells where an unstable motion leaves, before any step control meets it.
+    x, v, a = (np.asarray(q)[: len(record)] for q in run_grid(plant, fine, jnp.asarray(x0), jnp.asarray(v0)))
+    stop = _escape(plant, fine, x, v, record, x0, v0)
+    if stop is None and solver == "reference" and not friction:
+        scale = jnp.maximum(jnp.std(jnp.asarray(x)), 1e-30)
+        xr, vr, done = run_reference(plant, fine, jnp.asarray(x0), jnp.asarray(v0), tolerance, scale)
+        if bool(done):
+            x, v = np.asarray(xr)[: len(record)], np.asarray(vr)[: len(record)]
+            a = _accelerations(plant, fine, x, v)
+    n = len(record) if stop is None else stop
+    if record.base_acceleration is not None:
+        a = a + record.base_acceleration[:, None]
+    offsets = {s.at: float(s.b) for s in model.sensors if s.kind == "offset"}  # pyright: ignore[reportAttributeAccessIssue]
+    shown = {}
+    for kind, values in (("displacement", x), ("velocity", v), ("acceleration", a)):
+        shift = np.array([offsets.get((kind, j + 1), 0.0) for j in range(model.dof)])
+        shown[kind] = values[:n] + shift
+    gains = {s.at: float(s.eps) for s in model.sensors if s.kind == "accel_gain"}  # pyright: ignore[reportAttributeAccessIssue]
+    return Response(
+        time=record.time[:n],
+        result=Result.successful if stop is None else Result.diverged,
+        escape_time=None if stop is None else float(record.time[stop]),
+        _gains=gains,
+        **shown,
+    )
+
+
+def check_pair(model: Structure, record: Record) -> None:
+    """Refuse a record and a structure that do not belong together."""
+    if record.dofs > model.dof:
+        raise ValueError(f"`record` names degree of freedom {record.dofs}; the structure has {model.dof}.")
+    masses = np.asarray(model.mass)
+    if masses.ndim == 1 and np.any(masses == 0):
+        raise ValueError(f"`mass` must be positive for the structure to move; got {masses.tolist()}. A mass of 0 is for imposed motion only.")
+    if len(record) < 2:
+        raise ValueError(f"`record` must hold at least 2 samples; it has {len(record)}.")
+
+
+@jax.jit
+def _accelerations_program(plant, fine, x, v):
+    from ._grid import true_force
+    from ._stepper import free_acceleration, inverse_mass
+
+    minv = inverse_mass(plant)
+
+    def one(force, base, time, x, v):
+        return free_acceleration(plant, minv, x, v, true_force(plant, force[:1], base[:1])[0], time)
+
+    return jax.vmap(one)(fine.force, fine.base, fine.time, x, v)
+
+
+def _accelerations(plant: Plant, fine, x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    pad = ((0, fine.time.shape[0] - x.shape[0]), (0, 0))
+    return np.asarray(_accelerations_program(plant, fine, np.pad(x, pad), np.pad(v, pad)))[: x.shape[0]]
+
+
+def _escape(plant: Plant, fine, x, v, record: Record, x0, v0) -> int | None:
+    """First sample beyond every bound, if any."""
+    measured = [np.max(np.abs(y)) for (kind, _), y in record.responses.items() if kind == "displacement"]
+    stiffness = float(jnp.max(jnp.abs(plant.stiffness)))
+    static = float(jnp.max(jnp.abs(fine.force))) / stiffness if stiffness > 0 else 0.0
+    # With nothing else to compare with, the size of the first half of the run has to do.
+    own = float(np.nanmedian(np.abs(np.where(np.isfinite(x), x, np.nan)))) if np.any(np.isfinite(x)) else 0.0
+    bound = _BOUND * max([*measured, static, float(np.max(np.abs(x0))), own, 1e-300])
+    bad = ~np.all(np.isfinite(x) & np.isfinite(v) & (np.abs(x) < bound), axis=1)
+    return int(np.argmax(bad)) if np.any(bad) else None

@@ -1,0 +1,94 @@
+"""The state from which a free run begins."""
+
+from functools import partial
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from .._types import as_array
+from ..records import Record
+from ..structures import Structure
+from ._drive import Reconstruction
+from ._excitation import excitation, substeps_for
+from ._grid import run_grid
+from ._plant import lower, readout
+
+_ITERATIONS = 12
+
+
+def starting_state(
+    model: Structure, record: Record, initial_state: Any = None, *, window: int = 50, reconstruction: Reconstruction = "band-limited"
+) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement and velocity (dof,) at the first sample.
+
+    In this order: `initial_state`; rest if the record says so; least squares of the structure over the first `window`
+    samples of whatever response there is (Gauss-Newton with a Levenberg-Marquardt guard, every channel divided by its
+    spread); rest.
+    """
+    dof = model.dof
+    if initial_state is not None:
+        try:
+            x0, v0 = initial_state
+        except (TypeError, ValueError):
+            raise ValueError(f"`initial_state` must be a pair (displacement, velocity); got {initial_state!r}.") from None
+        pair = []
+        for name, value in (("displacement", x0), ("velocity", v0)):
+            array = np.atleast_1d(as_array(value, f"initial_state {name}", (0, 1)))
+            if array.shape != (dof,):
+                raise ValueError(f"`initial_state` {name} must have one value per degree of freedom ({dof}); got {array.size}.")
+            pair.append(array)
+        return pair[0], pair[1]
+    if record.at_rest or not record.responses:
+        return np.zeros(dof), np.zeros(dof)
+    return _least_squares(model, record[: min(window, len(record))], reconstruction)
+
+
+def _least_squares(model: Structure, head: Record, reconstruction: Reconstruction) -> tuple[np.ndarray, np.ndarray]:
+    channels = tuple(head.responses)
+    y = np.column_stack([head.responses[c] for c in channels])
+    spread = np.maximum(np.std(y, axis=0), 1e-12 * np.max(np.abs(y)) + 1e-300)
+    fine = excitation(head, model.dof, substeps_for(model, head.dt), reconstruction)
+    plant, show = lower(model, channels), readout(channels, model.dof)
+    offset = y - np.asarray(plant.channel_offset)
+    state = np.zeros(2 * model.dof)
+    for i, (kind, j) in enumerate(channels):  # a measured channel is its own best first guess
+        if kind in ("displacement", "velocity"):
+            state[(j - 1) + (model.dof if kind == "velocity" else 0)] = offset[0, i]
+    damp, best = 1e-6, None
+    for _ in range(_ITERATIONS):
+        residual, slope = _residuals(plant, show, fine, jnp.asarray(y), jnp.asarray(spread), jnp.asarray(state))
+        residual, slope = np.asarray(residual), np.asarray(slope)
+        cost = float(residual @ residual) if np.all(np.isfinite(residual)) else np.inf
+        if best is None or cost < best[0]:
+            improved = best is None or cost < best[0] * (1 - 1e-10)
+            best, damp = (cost, state, residual, slope), damp / 10
+            if not improved:
+                break
+        else:
+            damp *= 100
+        _, state, residual, slope = best
+        normal = slope.T @ slope
+        if not np.all(np.isfinite(normal)):
+            break
+        step = np.linalg.lstsq(normal + damp * np.diag(np.diag(normal)), -slope.T @ residual, rcond=None)[0]
+        state = best[1] + step
+    assert best is not None
+    return best[1][: model.dof], best[1][model.dof :]
+
+
+@eqx.filter_jit
+def _residuals(plant, show, fine, y, spread, state):
+    dof = plant.dof
+
+    def residual(state):
+        x, v, a = run_grid.__wrapped__(plant, fine, state[:dof], state[dof:])
+        shown = {"displacement": x, "velocity": v, "acceleration": a + fine.base[:, :1]}
+        seen = jnp.stack([shown[kind] @ row for kind, row in zip(show.kinds, show.select, strict=True)], 1)
+        return (((1 + plant.channel_gain) * seen + plant.channel_offset - y) / spread).ravel()
+
+    jacobian = jax.vmap(partial(jax.jvp, residual, (state,)), out_axes=(None, 1))
+    value, slope = jacobian((jnp.eye(2 * dof),))
+    return value, slope

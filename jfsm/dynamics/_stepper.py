@@ -1,0 +1,206 @@
+"""One step on the sample grid: Runge-Kutta of order four, with true stick and located reversals for friction.
+
+While every link either slides one way or sticks, the motion is smooth. So a step freezes that *mode* (+1, -1, or 0 for
+sticking), looks for the first instant at which a mode ends (a sliding speed passes zero, or the force that holds a
+sticking link passes its limit), steps to that instant, decides the next mode from the force needed to stick, and goes
+on. The number of such segments in a step is fixed, so that many runs go side by side.
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ._plant import Plant, friction_limits, smooth_force
+
+_SEGMENTS = 3
+"""Modes that one step may pass through: slide, stick, slide."""
+
+
+class Motion(NamedTuple):
+    """State of a run: displacement, velocity, and mode of each friction slot."""
+
+    x: Float[Array, " dof"]
+    v: Float[Array, " dof"]
+    mode: Float[Array, " slots"]
+
+
+class Load(NamedTuple):
+    """Forces at the start, the middle and the end of a step, its start time and its length."""
+
+    force: Float[Array, "3 dof"]
+    time: Float[Array, ""]
+    step: Float[Array, ""]
+
+    def at(self, share: Float[Array, ""]) -> Float[Array, " dof"]:
+        """Force at a share of the step, by the parabola through the three values."""
+        a, b, c = self.force[0], self.force[1], self.force[2]
+        return a + share * (4 * b - 3 * a - c) + share * share * (2 * a + 2 * c - 4 * b)
+
+
+def inverse_mass(plant: Plant) -> Float[Array, "dof dof"]:
+    """Inverse of the mass matrix, formed once per run."""
+    return 1.0 / plant.mass if plant.dof == 1 else jnp.linalg.inv(plant.mass)
+
+
+def _times(matrix, vector):
+    # Written as a sum: a matrix product of this size would leave the fused loop of the compiled step.
+    return jnp.sum(matrix * vector[None, :], 1)
+
+
+def free_acceleration(plant: Plant, minv, x, v, g, t):
+    """Acceleration without friction."""
+    return _times(minv, g - smooth_force(plant, x, v, t))
+
+
+def holding_force(plant: Plant, minv, a, sticking):
+    """Friction forces that keep the sticking links from moving, given the acceleration `a` without them."""
+    rows = plant.friction.direction
+    need = jnp.sum(rows * a[None, :], 1)
+    compliance = jnp.sum(rows[:, None, :] * jnp.sum(minv[None, :, :] * rows[:, None, :], 2)[None, :, :], 2)
+    if rows.shape[0] == 1:
+        return jnp.where(sticking, need / jnp.where(compliance[0] > 0, compliance[0], 1.0), 0.0)
+    both = sticking[:, None] & sticking[None, :]
+    matrix = jnp.where(both, compliance, jnp.eye(rows.shape[0]))
+    matrix = jnp.where(jnp.diag(matrix)[:, None] > 0, matrix, jnp.eye(rows.shape[0]))
+    return jnp.linalg.solve(matrix, jnp.where(sticking, need, 0.0))
+
+
+def acceleration(plant: Plant, minv, x, v, mode, g, t):
+    """Acceleration in the given mode, and the margin of each friction slot: negative once its mode has ended."""
+    a = free_acceleration(plant, minv, x, v, g, t)
+    if not len(plant.friction):
+        return a, mode
+    low, high = friction_limits(plant, x, v, t)
+    rows = plant.friction.direction
+    sliding = jnp.where(mode > 0, high, jnp.where(mode < 0, low, 0.0))
+    a = a - _times(minv, jnp.sum(rows * sliding[:, None], 0))
+    held = holding_force(plant, minv, a, mode == 0)
+    a = a - _times(minv, jnp.sum(rows * held[:, None], 0))
+    margin = jnp.where(mode == 0, jnp.minimum(high - held, held - low), mode * jnp.sum(rows * v[None, :], 1))
+    return a, margin
+
+
+def mode_at(plant: Plant, minv, x, v, g, t):
+    """Mode of each friction slot for a given state: the sign of its speed; at rest, whether it sticks or which way it goes."""
+    if not len(plant.friction):
+        return jnp.zeros(0)
+    speed = jnp.sum(plant.friction.direction * v[None, :], 1)
+    return jnp.where(speed != 0, jnp.sign(speed), _mode_from_rest(plant, minv, x, v, g, t))
+
+
+def _mode_from_rest(plant: Plant, minv, x, v, g, t):
+    # Force needed to hold each link alone; beyond a limit the link breaks away in that direction.
+    a = free_acceleration(plant, minv, x, v, g, t)
+    held = holding_force(plant, minv, a, jnp.ones(len(plant.friction), bool))
+    low, high = friction_limits(plant, x, jnp.zeros_like(v), t)
+    return jnp.where(held > high, 1.0, jnp.where(held < low, -1.0, 0.0))
+
+
+def _runge_kutta(plant: Plant, minv, x, v, mode, load: Load, start, share):
+    """State after `share` of the step from `start` (both shares of the whole step), in a frozen mode."""
+    h = share * load.step
+    t = load.time + start * load.step
+    g0, g1, g2 = (load.at(start), load.at(start + share / 2), load.at(start + share))
+
+    def slope(x, v, g, t):
+        return v, acceleration(plant, minv, x, v, mode, g, t)[0]
+
+    v1, a1 = slope(x, v, g0, t)
+    v2, a2 = slope(x + h / 2 * v1, v + h / 2 * a1, g1, t + h / 2)
+    v3, a3 = slope(x + h / 2 * v2, v + h / 2 * a2, g1, t + h / 2)
+    v4, a4 = slope(x + h * v3, v + h * a3, g2, t + h)
+    return x + h / 6 * (v1 + 2 * v2 + 2 * v3 + v4), v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+
+
+def advance(plant: Plant, minv, motion: Motion, load: Load) -> Motion:
+    """Motion at the end of one step."""
+    x, v, mode = motion
+    zero = jnp.zeros(())
+    if not len(plant.friction):
+        return Motion(*_runge_kutta(plant, minv, x, v, mode, load, zero, jnp.ones(())), mode)
+
+    def segment(carry, last):
+        x, v, mode, start = carry
+        left = 1.0 - start
+        xe, ve = _runge_kutta(plant, minv, x, v, mode, load, start, left)
+        ended = (acceleration(plant, minv, xe, ve, mode, load.at(jnp.ones(())), load.time + load.step)[1] < 0) & ~last
+        path = _path(plant, minv, (x, v), (xe, ve), mode, load, start, left)
+        shares = jnp.where(ended, _event(plant, minv, path, mode, load, start, left), 1.0)
+        share = jnp.min(shares)
+        any_event = jnp.any(ended)
+        xs, vs = path(share)
+        now = start + left * share
+        switching = ended & (shares == share)
+        rows = plant.friction.direction
+        vs = vs - _remove(minv, rows, jnp.sum(rows * vs[None, :], 1), switching & (mode != 0))
+        rest = _mode_from_rest(plant, minv, xs, vs, load.at(now), load.time + now * load.step)
+        x, v = jnp.where(any_event, xs, xe), jnp.where(any_event, vs, ve)
+        return (x, v, jnp.where(switching, rest, mode), jnp.where(any_event, now, 1.0)), None
+
+    # The last segment goes to the end whatever happens; a step is short beside the time between reversals.
+    last = jnp.arange(_SEGMENTS) == _SEGMENTS - 1
+    (x, v, mode, _), _ = jax.lax.scan(segment, (x, v, mode, zero), last)
+    return Motion(x, v, mode)
+
+
+def _remove(minv, rows, speed, stopped):
+    """Velocity that must go for the stopped links to be at rest exactly."""
+    effect = jnp.sum(minv[None, :, :] * rows[:, None, :], 2)
+    scale = jnp.sum(rows * effect, 1)
+    return jnp.sum(jnp.where(stopped, speed / jnp.where(scale > 0, scale, 1.0), 0.0)[:, None] * effect, 0)
+
+
+def _path(plant, minv, begin, end, mode, load, start, left):
+    """State along the rest of a step: cubic Hermite for x from v, and for v from the accelerations at both ends.
+
+    Its error is of the order of the step's own, and it is used at events only.
+    """
+    (x, v), (xe, ve) = begin, end
+    h = left * load.step
+    a0 = acceleration(plant, minv, x, v, mode, load.at(start), load.time + start * load.step)[0]
+    a1 = acceleration(plant, minv, xe, ve, mode, load.at(jnp.ones(())), load.time + load.step)[0]
+
+    def state(s):
+        h00, h10, h01, h11 = 2 * s**3 - 3 * s**2 + 1, s**3 - 2 * s**2 + s, 3 * s**2 - 2 * s**3, s**3 - s**2
+        return h00 * x + h10 * h * v + h01 * xe + h11 * h * ve, h00 * v + h10 * h * a0 + h01 * ve + h11 * h * a1
+
+    return state
+
+
+def _event(plant, minv, path, mode, load, start, left):
+    """Share of the rest of a step at which each mode ends, for those that do.
+
+    Four steps of regula falsi (Illinois) along the path; one more by its slope, taken with the found instant held
+    fixed, gives the instant its exact derivative.
+    """
+
+    def margin(s):
+        place = start + left * s
+        return acceleration(plant, minv, *path(s), mode, load.at(place), load.time + place * load.step)[1]
+
+    slots = jnp.arange(len(plant.friction))
+
+    def narrow(bracket, _):
+        low, f_low, high, f_high = bracket
+        middle = low + (high - low) * _crossing(f_low, f_high)
+        f = jax.vmap(margin)(middle)[slots, slots]
+        above = f > 0
+        inside = (jnp.where(above, middle, low), jnp.where(above, f, f_low / 2))
+        return (*inside, jnp.where(above, high, middle), jnp.where(above, f_high / 2, f)), None
+
+    zero, one = jnp.zeros(()), jnp.ones(())
+    ends = (jnp.zeros(slots.size), jnp.maximum(margin(zero), 0.0), jnp.ones(slots.size), margin(one))
+    (low, f_low, high, f_high), _ = jax.lax.scan(narrow, jax.lax.stop_gradient(ends), length=4)
+    found = jax.lax.stop_gradient(low + (high - low) * _crossing(f_low, f_high))
+    value, slope = jax.vmap(lambda s: jax.jvp(margin, (s,), (one,)))(found)
+    value, slope = value[slots, slots], jax.lax.stop_gradient(slope[slots, slots])
+    correction = jnp.where(slope < 0, value / jnp.where(slope < 0, slope, 1.0), 0.0)
+    return jnp.clip(found - correction, 0.0, 1.0)
+
+
+def _crossing(above, below):
+    """Share of an interval at which the line from `above` > 0 to `below` < 0 crosses zero."""
+    gap = above - below
+    return jnp.where(gap > 0, above / jnp.where(gap > 0, gap, 1.0), 0.5)

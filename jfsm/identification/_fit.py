@@ -1,0 +1,167 @@
+"""Values of a structure's own numbers from records."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._result import Result
+from .._types import require_x64
+from ..dynamics import Reconstruction
+from ..records import Record
+from ..structures import Structure
+from ._maximise import maximise
+from ._nuisances import Nuisances, prepare
+from ._posterior import Hypothesis, Posterior
+from ._unknowns import Unknown, bounded, free_unknown, nuisance_unknowns, with_offsets
+
+_TIED = 0.98
+"""Correlation from which two values cannot be told apart in practice."""
+_LOOSE = 0.5
+"""Relative standard error from which a value is hardly determined."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A structure fitted to records.
+
+    Attributes
+    ----------
+    structure : Structure
+        The structure with the values found, and with the offsets of the first record's channels where they are
+        significant.
+    values : dict of path to float
+    intervals : dict of path to (low, high)
+        95 % intervals.
+    correlations : dict of (path, path) to float
+    identifiability : tuple of str
+        What the records cannot tell, in words; empty where every value is determined.
+    log_likelihood : float
+    noise : dict of channel to float
+        Standard deviation of each channel's white noise as found, of the first record.
+    result : Result
+    """
+
+    structure: Structure
+    values: dict[str, float]
+    intervals: dict[str, tuple[float, float]]
+    correlations: dict[tuple[str, str], float]
+    identifiability: tuple[str, ...]
+    log_likelihood: float
+    noise: dict[str, float]
+    result: Result
+
+
+def fit(
+    model: Structure,
+    record: Record | Sequence[Record],
+    fixed: Sequence[str] = (),
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    *,
+    reconstruction: Reconstruction = "band-limited",
+) -> Fit:
+    """Most probable values of a structure's numbers, with intervals.
+
+    The likelihood is that of the innovations of an extended Kalman filter driven by the measured force; offsets,
+    initial states and noise scales are found along.
+
+    Parameters
+    ----------
+    model : Structure
+        Its values are the start, and the centre of very wide prior laws.
+    record : Record or sequence of Records
+        Sampled evenly; unequal lengths are fine.
+    fixed : sequence of paths or kinds
+        Numbers that stay, e.g. ``("mass", "stiffness@0-1.k")``.
+    bounds : mapping of path or kind to (low, high), optional
+        In the unit of the number.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    ValueError
+        If a name in `fixed` or `bounds` means nothing, bounds are the wrong way round, or the record cannot be used.
+    """
+    require_x64()
+    records = [record] if isinstance(record, Record) else list(record)
+    if not records:
+        raise ValueError("`record` must hold at least one record; the sequence is empty.")
+    prepared = [prepare(r, model, reconstruction) for r in records]
+    free = free_paths(model, prepared, fixed)
+    structure = with_offsets(model, prepared)
+    unknowns = [free_unknown(structure, path, prepared[0]) for path in free]
+    unknowns = _bounded(unknowns, bounds or {}, model)
+    for index, nuisances in enumerate(prepared):
+        unknowns += nuisance_unknowns(structure, nuisances, index)
+    posterior = Posterior(Hypothesis((structure,), (tuple(unknowns),)), prepared)
+    best = maximise(posterior)
+    theta, covariance = best.theta[0], np.linalg.pinv(best.information[0], hermitian=True)
+    error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    intervals = {}
+    for u, t, s in zip(unknowns[: len(free)], theta, error, strict=False):
+        low, high = sorted((u.value(max(t - 1.96 * s, u.low)), u.value(min(t + 1.96 * s, u.high))))
+        intervals[u.path] = (low, high)
+    correlation = covariance / np.maximum(np.outer(error, error), 1e-300)
+    pairs = {(free[i], free[j]): float(correlation[i, j]) for i in range(len(free)) for j in range(i)}
+    values = {u.path: u.value(t) for u, t in zip(unknowns[: len(free)], theta, strict=False)}
+    kept = without_small_offsets(posterior.structure(theta), unknowns, theta, error)
+    noise = {
+        f"{kind} {j}": float(f * np.exp(t / 2))
+        for (kind, j), f, t in zip(prepared[0].channels, prepared[0].floor, _scales(unknowns, theta), strict=False)
+    }
+    words = _words(unknowns[: len(free)], theta, error, pairs, structure)
+    return Fit(kept, values, intervals, pairs, words, -float(best.value[0]), noise, best.results[0])
+
+
+def free_paths(model: Structure, records: Sequence[Nuisances], fixed: Sequence[str]) -> tuple[str, ...]:
+    """Paths that a fit may change; masses stay where no force gives the scale."""
+    held: set[str] = set()
+    for name in [fixed] if isinstance(fixed, str) else fixed:
+        paths = model.select(name)
+        if not paths:
+            raise ValueError(f"`fixed` names {name!r}, which the structure does not have; it has {', '.join(model.values())}.")
+        held.update(paths)
+    if not any(n.fine.force.any() or n.fine.base.any() for n in records):
+        held.update(model.select("mass"))
+    return tuple(p for p in model.entries() if p not in held and not p.startswith("offset@"))
+
+
+def without_small_offsets(structure: Structure, unknowns: Sequence[Unknown], theta: np.ndarray, error: np.ndarray) -> Structure:
+    """The structure without the offsets that are not three standard errors from nothing."""
+    small = {u.path for u, t, s in zip(unknowns, theta, error, strict=True) if u.path.startswith("offset@") and abs(t) < 3 * s}
+    kept = [s for s in structure.sensors if f"{s.kind}@{s.place}.b" not in small]
+    return Structure(structure.mass, structure.terms, kept, structure.trust)
+
+
+def _scales(unknowns: Sequence[Unknown], theta: np.ndarray) -> list[float]:
+    return [t for u, t in zip(unknowns, theta, strict=True) if u.path.startswith("noise@")]
+
+
+def _bounded(unknowns: list[Unknown], bounds: Mapping[str, tuple[float, float]], model: Structure) -> list[Unknown]:
+    for name, (low, high) in bounds.items():
+        paths = model.select(name)
+        if not paths:
+            raise ValueError(f"`bounds` names {name!r}, which the structure does not have; it has {', '.join(model.values())}.")
+        if not low < high:
+            raise ValueError(f"`bounds` of {name!r} must be (low, high) with low < high; got ({low}, {high}).")
+        unknowns = [bounded(u, low, high) if u.path in paths else u for u in unknowns]
+    return unknowns
+
+
+def _words(unknowns: Sequence[Unknown], theta, error, pairs: Mapping[tuple[str, str], float], structure: Structure) -> tuple[str, ...]:
+    """What the records cannot tell."""
+    words = []
+    for (a, b), r in pairs.items():
+        if abs(r) > _TIED:
+            joint = "their ratio" if r > 0 else "their product"
+            words.append(f"{a} and {b} cannot be told apart by this record (correlation {r:+.3f}); {joint} can.")
+    for u, t, s in zip(unknowns, theta, error, strict=False):
+        relative = s if u.log else s / max(abs(t), 1e-300)
+        if relative > _LOOSE:
+            words.append(f"{u.path} is hardly determined by this record (relative standard error {relative:.0%}).")
+        if t <= u.low or t >= u.high:
+            words.append(f"{u.path} ends at its bound {u.value(t):.6g}.")
+    return tuple(words)

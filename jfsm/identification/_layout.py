@@ -1,0 +1,52 @@
+"""Where each number of a structure stands in its plant.
+
+A plant is linear in every mass, stiffness, law parameter and sensor value, so a vector of values times a constant
+matrix is the plant. That matrix is data: another place, sign or law leaves the compiled program as it is.
+"""
+
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..dynamics._plant import Channel, Plant, lower
+from ..structures import Structure
+
+_PARTS = ("mass", "damping", "stiffness", "force_gain", "force_offset", "channel_gain", "channel_offset")
+
+
+def plant_vector(plant: Plant) -> Float[np.ndarray, " size"]:
+    """All numbers of a plant that parameters can change, in one row."""
+    parts = [getattr(plant, name) for name in _PARTS] + [plant.smooth.parameters, plant.friction.parameters]
+    return np.concatenate([np.asarray(part).ravel() for part in parts])
+
+
+def with_vector(plant: Plant, vector: Float[Array, " size"]) -> Plant:
+    """The plant with these numbers; the inverse of `plant_vector`, traceable."""
+    place, parts = 0, {}
+    for name in _PARTS:
+        shape = getattr(plant, name).shape
+        size = int(np.prod(shape))
+        parts[name], place = jnp.reshape(vector[place : place + size], shape), place + size
+    slots = []
+    for old in (plant.smooth, plant.friction):
+        size = int(np.prod(old.parameters.shape))
+        row = jnp.reshape(vector[place : place + size], old.parameters.shape)
+        slots.append(type(old)(old.kind, row, old.direction, old.laws))
+        place += size
+    return Plant(**parts, smooth=slots[0], friction=slots[1], maps=plant.maps)
+
+
+def plant_rows(structure: Structure, paths: Sequence[str], channels: Sequence[Channel], **slots: int) -> Float[np.ndarray, "paths size"]:
+    """Derivative of the plant's vector by each of the structure's numbers `paths`.
+
+    The plant is linear in each, so doubling a number shows it exactly.
+    """
+    base, values = plant_vector(lower(structure, channels, **slots)), structure.values()
+    rows = []
+    for path in paths:
+        value = values[path]
+        step = value if value != 0 else 1.0
+        rows.append((plant_vector(lower(structure.with_values({path: value + step}), channels, **slots)) - base) / step)
+    return np.array(rows).reshape(len(paths), base.size)

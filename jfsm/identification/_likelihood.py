@@ -1,0 +1,85 @@
+"""The likelihood of a structure on one record, its gradient and its information matrix, in one compiled program.
+
+With innovations e and their variances S,
+
+    -log L = ½ Σ (e²/S + log 2πS),     F = Σ (∂e ∂eᵀ / S + ½ ∂log S ∂log Sᵀ),
+
+F being the expected information. All derivatives go forward, side by side with the filter itself, and several starts
+run as lanes of the same program.
+"""
+
+from functools import partial
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..dynamics._grid import Fine
+from ..dynamics._plant import Plant, Readout
+from ..estimation._filter import Innovations, ProcessNoise, Readings, Start, innovations
+from ._layout import with_vector
+
+_START_VARIANCE = 1e-12
+"""Variance of the initial state in units of its size: the state itself is among the unknowns."""
+
+
+class Lanes(eqx.Module):
+    """Parameter maps of several starts: numbers = base + rows·value(theta), first the plant's, then x0, v0, log scales."""
+
+    base: Float[Array, "lanes size"]
+    rows: Float[Array, "lanes unknowns size"]
+    unit: Float[Array, "lanes unknowns"]
+    log: Float[Array, "lanes unknowns"]
+
+
+def _run(plant: Plant, lane, theta, show: Readout, fine: Fine, readings: Readings, noise: ProcessNoise, size) -> Innovations:
+    base, rows, unit, log = lane
+    value = unit * jnp.where(log > 0, jnp.exp(jnp.where(log > 0, theta, 0.0)), theta)
+    numbers = base + jnp.sum(rows * value[:, None], 0)
+    dof, channels = plant.dof, readings.values.shape[1]
+    tail = numbers[numbers.size - 2 * dof - channels :]
+    covariance = _START_VARIANCE * jnp.diag(size**2)
+    start = Start(tail[:dof], tail[dof : 2 * dof], covariance)
+    return innovations(with_vector(plant, numbers), show, fine, readings, noise, start, tail[2 * dof :])
+
+
+def _axes(plant: Plant):
+    # Values and places differ between lanes; which law stands in a slot does not, so that it stays a branch.
+    return jax.tree.map(lambda leaf: 0 if jnp.issubdtype(leaf.dtype, jnp.floating) else None, plant)
+
+
+@eqx.filter_jit
+def derivatives(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, size, until):
+    """Minus log-likelihood (lanes,), its gradient (lanes, unknowns) and the information (lanes, unknowns, unknowns).
+
+    Samples from index `until` on take no part. `plant` has a leading axis of lanes on every floating leaf.
+    """
+    counted = readings.use * (jnp.arange(readings.valid.size) < until)[:, None] * readings.valid[:, None]
+
+    def one(plant, base, rows, unit, log, theta):
+        def outcome(theta):
+            found = _run(plant, (base, rows, unit, log), theta, show, fine, readings, noise, size)
+            return found.error, jnp.log(found.variance)
+
+        push = partial(jax.jvp, outcome, (theta,))
+        (error, log_variance), (by_error, by_variance) = jax.vmap(push, out_axes=(None, 0))((jnp.eye(theta.size),))
+        deviation = jnp.sqrt(counted) * jnp.exp(-log_variance / 2)
+        e, de, ds = error * deviation, by_error * deviation, by_variance * jnp.sqrt(counted)
+        value = 0.5 * jnp.sum(e**2 + counted * (log_variance + jnp.log(2 * jnp.pi)))
+        flat = lambda array: array.reshape(array.shape[0], -1)  # noqa: E731
+        gradient = flat(de) @ e.ravel() + 0.5 * flat(ds) @ (jnp.sqrt(counted) - e**2 / jnp.maximum(jnp.sqrt(counted), 1e-30)).ravel()
+        return value, gradient, flat(de) @ flat(de).T + 0.5 * flat(ds) @ flat(ds).T
+
+    mapped = jax.vmap(one, in_axes=(_axes(plant), 0, 0, 0, 0, 0))
+    return mapped(plant, lanes.base, lanes.rows, lanes.unit, lanes.log, theta)
+
+
+@eqx.filter_jit
+def predictions(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, size) -> Innovations:
+    """Innovations (lanes, n, channels) of every lane."""
+
+    def one(plant, base, rows, unit, log, theta):
+        return _run(plant, (base, rows, unit, log), theta, show, fine, readings, noise, size)
+
+    return jax.vmap(one, in_axes=(_axes(plant), 0, 0, 0, 0, 0))(plant, lanes.base, lanes.rows, lanes.unit, lanes.log, theta)

@@ -1,0 +1,110 @@
+"""Levenberg-Marquardt on the posterior, several starts side by side."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._result import Result
+from ._posterior import Posterior
+
+LADDER = (0.3, 0.03)
+"""Shares of unmodelled force that the first rungs forgive: wide basins first, the true noise last."""
+_RUNG_STEPS = 3
+_ENOUGH = 0.01
+"""A step that promises less than this many nats is the last,"""
+_HOPELESS = 0.02
+"""or less than this share of what the start is behind the best value known."""
+_LONGEST = 1.0
+"""Largest change of a logarithm in one step."""
+
+
+@dataclass(frozen=True)
+class Maximum:
+    """Best values of every lane: minus log-posterior, theta, information, and how it ended."""
+
+    value: np.ndarray
+    theta: np.ndarray
+    information: np.ndarray
+    results: tuple[Result, ...]
+
+    def evidence(self, lane: int) -> float:
+        """Laplace approximation of the log-evidence of one lane."""
+        sign, logdet = np.linalg.slogdet(self.information[lane])
+        if sign <= 0:
+            return -np.inf
+        return float(-self.value[lane] + 0.5 * self.theta.shape[1] * np.log(2 * np.pi) - 0.5 * logdet)
+
+
+def maximise(posterior: Posterior, steps: int = 25, ladder: Sequence[float] = LADDER, best: float = np.inf) -> Maximum:
+    """Climb from every start, first with a process noise that forgives unmodelled force.
+
+    `best` is the smallest minus log-posterior that any hypothesis reached: one that stays far above it need not be
+    exact.
+    """
+    theta = posterior.initial()
+    for share in ladder:
+        theta = _climb(posterior, theta, share, _RUNG_STEPS).theta
+    return _climb(posterior, theta, 0.0, steps, best)
+
+
+def _climb(posterior: Posterior, theta: np.ndarray, slack: float, steps: int, best: float = np.inf) -> Maximum:
+    unknowns = posterior.hypothesis.unknowns
+    low = np.array([[u.low for u in row] for row in unknowns])
+    high = np.array([[u.high for u in row] for row in unknowns])
+    log = np.array([[u.log for u in row] for row in unknowns])
+    lanes = theta.shape[0]
+    value, gradient, information = _finite(posterior.evaluate(theta, slack))
+    damp = np.full(lanes, 1e-3)
+    open_, results = np.ones(lanes, bool), [Result.maximum_steps] * lanes
+    for _ in range(steps):
+        move, promise = _steps(theta, gradient, information, damp, low, high, log)
+        for lane in np.flatnonzero(open_):
+            behind = max(0.0, value[lane] - min(best, float(np.min(value))))
+            if promise[lane] < _ENOUGH + _HOPELESS * behind and damp[lane] < 1.0:
+                open_[lane], results[lane] = False, Result.successful
+            elif damp[lane] > 1e8:
+                open_[lane], results[lane] = False, Result.stalled
+        if not np.any(open_):
+            break
+        trial = np.where(open_[:, None], theta + move, theta)
+        tried, slope, curve = _finite(posterior.evaluate(trial, slack))
+        better = open_ & (tried < value)
+        theta = np.where(better[:, None], trial, theta)
+        value = np.where(better, tried, value)
+        gradient = np.where(better[:, None], slope, gradient)
+        information = np.where(better[:, None, None], curve, information)
+        damp = np.where(better, np.maximum(damp / 10, 1e-9), np.where(open_, np.maximum(damp, 1e-4) * 10, damp))
+    return Maximum(value, theta, information, tuple(results))
+
+
+def _steps(theta, gradient, information, damp, low, high, log):
+    """Damped Newton steps within bounds, and the gain that each promises."""
+    moves, promises = np.zeros_like(theta), np.zeros(theta.shape[0])
+    for lane in range(theta.shape[0]):
+        g, f = gradient[lane], information[lane]
+        if not np.all(np.isfinite(f)):
+            continue
+        held = ((theta[lane] <= low[lane]) & (g > 0)) | ((theta[lane] >= high[lane]) & (g < 0))
+        free = ~held
+        if not np.any(free):
+            continue
+        a = f[np.ix_(free, free)]
+        damped = a + damp[lane] * np.diag(np.diag(a))
+        step = np.zeros(theta.shape[1])
+        step[free] = -np.linalg.lstsq(damped, g[free], rcond=None)[0]
+        longest = np.max(np.abs(step[log[lane]]), initial=0.0)
+        if longest > _LONGEST:
+            step *= _LONGEST / longest
+        step = np.clip(theta[lane] + step, low[lane], high[lane]) - theta[lane]
+        moves[lane] = step
+        promises[lane] = -(g @ step) - 0.5 * step @ f @ step
+    return moves, promises
+
+
+def _finite(outcome):
+    """A lane whose filter ran away counts as infinitely bad."""
+    value, gradient, information = outcome
+    bad = ~(np.isfinite(value) & np.all(np.isfinite(gradient), 1) & np.all(np.isfinite(information), (1, 2)))
+    value = np.where(bad, np.inf, value)
+    return value, np.where(bad[:, None], 0.0, gradient), np.where(bad[:, None, None], np.eye(gradient.shape[1]), information)

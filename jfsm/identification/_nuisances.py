@@ -1,0 +1,178 @@
+"""What every hypothesis on a record shares: its noise, its reconstructed drive, its unknown start and offsets."""
+
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+
+from ..dynamics._drive import Reconstruction
+from ..dynamics._excitation import bucket, excitation, fastest_mode, measured_force, substeps_for
+from ..dynamics._grid import Fine
+from ..dynamics._plant import Channel, Readout, readout
+from ..dynamics._simulate import check_pair
+from ..dynamics._start import starting_state
+from ..estimation._filter import ProcessNoise, Readings
+from ..records import Record, clipped, noise_floor, spikes
+from ..structures import Structure
+
+_LEAST_NOISE = 1e-4
+"""Noise of a channel as a share of its size, at least: below it the integration error would be taken for physics."""
+_LEAST_DISTURBANCE = 2e-4
+"""Acceleration that is never explained, as a share of its size, white over a radian of the motion."""
+_BAND_LIMITED = 1e-3
+"""Noise of a channel whose signal fills its band, as a share of its size: nothing in it tells."""
+FINEST = 2
+"""Samples per knot at which a spline's residual holds signal as well."""
+_OVERSAMPLED = 3
+"""Samples per knot from which a spline's curve may stand for the force: the band above holds noise only."""
+
+
+@dataclass(frozen=True)
+class Nuisances:
+    """One record as the likelihood sees it; the same object for all hypotheses.
+
+    Attributes
+    ----------
+    channels : tuple of (kind, degree of freedom)
+        Response channels.
+    spread : (channels,) array
+        Standard deviation of each channel's readings.
+    floor : (channels,) array
+        Standard deviation of each channel's white noise; a mere guess where `trusted` is false, because the channel's
+        signal fills its band.
+    length, omega : float
+        Size of the motion [length unit] and its angular frequency [rad/s]: the scales of priors.
+    x0, v0 : (dof,) arrays
+        First guess of the initial state; `at_rest` says that it is known.
+    """
+
+    record: Record
+    channels: tuple[Channel, ...]
+    show: Readout
+    fine: Fine
+    readings: Readings
+    noise: ProcessNoise
+    spread: np.ndarray
+    floor: np.ndarray
+    trusted: np.ndarray
+    length: float
+    omega: float
+    x0: np.ndarray
+    v0: np.ndarray
+    at_rest: bool
+    reconstruction: Reconstruction
+    notes: tuple[str, ...]
+
+    @property
+    def samples(self) -> int:
+        return len(self.record)
+
+    def head(self, until: int) -> tuple[Fine, Readings]:
+        """Drive and readings cut to the padded length of the first `until` samples."""
+        n, r, f = min(bucket(until), self.fine.time.shape[0]), self.readings, self.fine
+        readings = Readings(r.values[:n], r.use[:n], r.variance, r.valid[:n])
+        return Fine(f.force[:n], f.base[:n], f.time[:n], f.step), readings
+
+
+def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "band-limited") -> Nuisances:
+    """Nuisances of a record, scaled by the model as it is believed.
+
+    Raises
+    ------
+    ValueError
+        If the record holds no response, is shorter than 32 samples, or does not fit the model.
+    """
+    check_pair(model, record)
+    if not record.responses:
+        raise ValueError("`record` must hold a response (displacement, velocity or acceleration); it has none to compare with.")
+    if len(record) < 32:
+        raise ValueError(f"`record` must hold at least 32 samples to tell noise from motion; it has {len(record)}.")
+    dt, dof = record.dt, model.dof
+    channels = tuple(record.responses)
+    notes: list[str] = list(record.notes)
+    values = np.column_stack([record.responses[c] for c in channels])
+    spread = np.std(values, axis=0)
+    for channel, size in zip(channels, spread, strict=True):
+        if size == 0:
+            raise ValueError(f"`{channel[0]}` {channel[1]} is constant; leave a dead channel out of the record.")
+    use = np.ones_like(values)
+    floors, trusted = [], []
+    for i, (kind, j) in enumerate(channels):
+        floor = noise_floor(values[:, i], dt)
+        trusted.append(floor.spacing > FINEST)
+        floors.append(max(floor.std if trusted[-1] else min(floor.std, _BAND_LIMITED * spread[i]), _LEAST_NOISE * spread[i]))
+        lost = clipped(values[:, i]) | spikes(values[:, i], floors[-1])
+        if np.any(lost):
+            use[lost, i] = 0.0
+            notes.append(f"{kind} {j}: {int(lost.sum())} clipped or torn samples take no part.")
+    force, force_variance, share, words = _force(record, dof)
+    notes += words
+    omega = fastest_mode(model) or 2 * np.pi / max(record.duration, dt)
+    length = _length(channels, spread, omega)
+    masses = np.asarray(model.mass)
+    mass = masses if masses.ndim == 1 else np.diag(masses)
+    variance = np.array(floors) ** 2
+    for i, (kind, j) in enumerate(channels):
+        if kind == "acceleration":  # an acceleration is predicted with the force's own noise, less what smoothing took
+            variance[i] += force_variance[j - 1] * share / mass[j - 1] ** 2
+    n, padded = len(record), bucket(len(record))
+    fill = ((0, padded - n), (0, 0))
+    readings = Readings(
+        values=jnp.asarray(np.pad(values, fill)),
+        use=jnp.asarray(np.pad(use, fill)),
+        variance=jnp.asarray(variance),
+        valid=jnp.asarray(np.arange(padded) < n, dtype=jnp.float64),
+    )
+    size = omega**2 * length
+    noise = ProcessNoise(jnp.asarray(force_variance), jnp.full(dof, (_LEAST_DISTURBANCE * size) ** 2 / omega))
+    x0, v0 = starting_state(model, record, reconstruction=reconstruction)
+    return Nuisances(
+        record=record,
+        channels=channels,
+        show=readout(channels, dof),
+        fine=excitation(record, dof, substeps_for(model, dt), reconstruction, length=padded, force=force),
+        readings=readings,
+        noise=noise,
+        spread=spread,
+        floor=np.array(floors),
+        trusted=np.array(trusted),
+        length=length,
+        omega=omega,
+        x0=x0,
+        v0=v0,
+        at_rest=record.at_rest,
+        reconstruction=reconstruction,
+        notes=tuple(notes),
+    )
+
+
+def _force(record: Record, dof: int) -> tuple[np.ndarray, np.ndarray, float, list[str]]:
+    """Force samples to run with, variance of their noise, share of it left in them, and notes.
+
+    Where the force is smooth on its own grid, its noise is smoothed away; where it fills the band, the spline's
+    residual is signal, and the noise is taken as a thousandth of the force.
+    """
+    force, notes = measured_force(record, dof), []
+    variance, share = np.zeros(dof), 1.0
+    for (kind, j), samples in record.channels.items():
+        if kind != "force":
+            continue
+        if not np.any(force[:, j - 1]):
+            if np.any(samples):
+                notes.append(f"force {j} holds nothing but noise and counts as zero.")
+            continue
+        if np.any(clipped(samples)):
+            notes.append(f"force {j} looks clipped; its true peaks are not known, which shows as an unexplained effect.")
+        floor = noise_floor(samples, record.dt)
+        if floor.spacing >= _OVERSAMPLED:
+            force[:, j - 1] = floor.smooth
+            variance[j - 1], share = floor.std**2, floor.effective_parameters / samples.size
+        else:
+            variance[j - 1] = (_BAND_LIMITED * float(np.std(samples))) ** 2
+    return force, variance, share, notes
+
+
+def _length(channels: tuple[Channel, ...], spread: np.ndarray, omega: float) -> float:
+    power = {"displacement": 0, "velocity": 1, "acceleration": 2}
+    sizes = {power[kind]: size / omega ** power[kind] for (kind, _), size in zip(channels, spread, strict=True)}
+    return float(sizes[min(sizes)])

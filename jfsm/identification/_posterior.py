@@ -1,0 +1,187 @@
+"""A structure's posterior on one or several records: likelihood times what was known beforehand."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..dynamics._plant import Plant, lower
+from ..estimation._filter import Innovations, ProcessNoise
+from ..structures import Structure
+from ._layout import plant_rows, plant_vector
+from ._likelihood import Lanes, derivatives, predictions
+from ._nuisances import Nuisances
+from ._unknowns import DEGREES, Unknown
+
+LANES = 2
+"""Starts that run side by side where nothing sticks; a single one is doubled, so that one program serves all."""
+_WIDTHS = (8, 12, 16, 20, 24, 32, 48, 64, 96, 128)
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """Structures that differ in their numbers, places or signs only, as starts of one fit.
+
+    `unknowns[i]` belong to `structures[i]`; all have the same paths up to the place of the effect.
+    """
+
+    structures: tuple[Structure, ...]
+    unknowns: tuple[tuple[Unknown, ...], ...]
+
+    @property
+    def size(self) -> int:
+        return len(self.unknowns[0])
+
+
+class Posterior:
+    """Value, gradient and information of minus the log-posterior for `LANES` starts of one hypothesis.
+
+    `until` (one per record) ends the samples that count.
+    """
+
+    def __init__(self, hypothesis: Hypothesis, records: Sequence[Nuisances], until: Sequence[int] | None = None):
+        self.hypothesis, self.records = hypothesis, tuple(records)
+        self.until = tuple(n.samples for n in records) if until is None else tuple(until)
+        count = len(hypothesis.structures)
+        # Reversals make a lane dear and a program slow to compile: one start at a time there.
+        lanes = 1 if len(lower(hypothesis.structures[0]).friction) else LANES
+        if count > lanes:
+            raise ValueError(f"At most {lanes} starts fit into one call; got {count}.")
+        self._pick = [min(i, count - 1) for i in range(lanes)]
+        self._parts = [self._part(index, nuisances) for index, nuisances in enumerate(self.records)]
+
+    @property
+    def lanes(self) -> int:
+        return len(self.hypothesis.structures)
+
+    def initial(self) -> np.ndarray:
+        """Starting values (lanes, unknowns)."""
+        return np.array([[u.theta for u in unknowns] for unknowns in self.hypothesis.unknowns])
+
+    def evaluate(self, theta: np.ndarray, slack: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Minus log-posterior (lanes,), gradient and information; `slack` is the share of unmodelled force forgiven."""
+        lanes, size = theta.shape
+        value, gradient, information = np.zeros(lanes), np.zeros((lanes, size)), np.zeros((lanes, size, size))
+        for nuisances, until, (plant, maps, mine) in zip(self.records, self.until, self._parts, strict=True):
+            width = maps.unit.shape[1]
+            inner = np.zeros((len(self._pick), width))
+            inner[:, : len(mine)] = theta[self._pick][:, mine]
+            scale = jnp.asarray(np.repeat([nuisances.length, nuisances.length * nuisances.omega], plant.mass.shape[-1]))
+            fine, readings = nuisances.head(until)
+            out = derivatives(plant, maps, jnp.asarray(inner), nuisances.show, fine, readings, slackened(nuisances, slack), scale, until)
+            v, g, f = (np.asarray(o)[:lanes] for o in out)
+            value += v
+            gradient[:, mine] += g[:, : len(mine)]
+            information[np.ix_(range(lanes), mine, mine)] += f[:, : len(mine), : len(mine)]
+        for lane in range(lanes):
+            p, pg, pf = prior(self.hypothesis.unknowns[lane], theta[lane])
+            value[lane] += p
+            gradient[lane] += pg
+            information[lane] += np.diag(pf)
+        return value, gradient, information
+
+    def innovations(
+        self, theta: np.ndarray, index: int = 0, *, use: np.ndarray | None = None, noise_scales: bool = True, slack: float = 0.0
+    ) -> Innovations:
+        """Innovations of record `index` at `theta` (unknowns,) of a hypothesis with one start.
+
+        `use` (n, channels) masks readings, `slack` forgives unmodelled force as in `evaluate`. Without `noise_scales` the channels' noise is taken at its floor.
+        """
+        nuisances, (plant, maps, mine) = self.records[index], self._parts[index]
+        inner = np.zeros((len(self._pick), maps.unit.shape[1]))
+        chosen = np.array([0.0 if u.path.startswith("noise@") and not noise_scales else t for u, t in zip(self.hypothesis.unknowns[0], theta, strict=True)])
+        inner[:, : len(mine)] = chosen[mine]
+        readings = nuisances.readings
+        if use is not None:
+            padded = np.zeros(readings.use.shape)
+            padded[: len(use)] = use
+            readings = replace_use(readings, padded)
+        scale = jnp.asarray(np.repeat([nuisances.length, nuisances.length * nuisances.omega], plant.mass.shape[-1]))
+        found = predictions(plant, maps, jnp.asarray(inner), nuisances.show, nuisances.fine, readings, slackened(nuisances, slack), scale)
+        n = nuisances.samples
+        return Innovations(np.asarray(found.error)[0, :n], np.asarray(found.variance)[0, :n])  # pyright: ignore[reportArgumentType]
+
+    def structure(self, theta: np.ndarray, lane: int = 0) -> Structure:
+        """The structure with the values of one lane."""
+        unknowns = self.hypothesis.unknowns[lane]
+        known = self.hypothesis.structures[lane].values()
+        first = {u.path: u.value(t) for u, t in reversed(list(zip(unknowns, theta, strict=True))) if u.path in known}
+        return self.hypothesis.structures[lane].with_values(first)
+
+    def _part(self, index: int, nuisances: Nuisances) -> tuple[Plant, Lanes, np.ndarray]:
+        """Plants and parameter maps of all lanes on one record, and which unknowns act on it."""
+        structures = [self.hypothesis.structures[i] for i in self._pick]
+        mine = np.array([k for k, u in enumerate(self.hypothesis.unknowns[0]) if u.record in (None, index)])
+        width = next(w for w in _WIDTHS if w >= len(mine))
+        slots = {"smooth_slots": _slot_bucket(structures[0])}
+        plants = [lower(s, nuisances.channels, **slots) for s in structures]
+        packed = {}
+        for lane in set(self._pick):
+            mine_of = [self.hypothesis.unknowns[lane][k] for k in mine]
+            structure = self.hypothesis.structures[lane]
+            packed[lane] = _lane(structure, mine_of, nuisances, plant_vector(lower(structure, nuisances.channels, **slots)), width, slots)
+        base, rows, unit, log = (jnp.asarray(np.stack([packed[lane][i] for lane in self._pick])) for i in range(4))
+        stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves) if jnp.issubdtype(leaves[0].dtype, jnp.floating) else leaves[0], *plants)
+        return stacked, Lanes(base, rows, unit, log), mine
+
+
+def _lane(structure, unknowns, nuisances: Nuisances, vector, width, slots):
+    dof, channels = structure.dof, len(nuisances.channels)
+    tail = {f"x0@{j + 1}": j for j in range(dof)} | {f"v0@{j + 1}": dof + j for j in range(dof)} | {f"noise@{c}": 2 * dof + c for c in range(channels)}
+    size = vector.size + 2 * dof + channels
+    base, rows = np.zeros(size), np.zeros((width, size))
+    unit, log = np.zeros(width), np.zeros(width)
+    base[: vector.size] = vector
+    base[vector.size :] = np.concatenate([nuisances.x0, nuisances.v0, np.zeros(channels)])
+    inside = [u.path for u in unknowns if u.path not in tail]
+    found = dict(zip(inside, plant_rows(structure, inside, nuisances.channels, **slots), strict=True))
+    known = structure.values()
+    for k, u in enumerate(unknowns):
+        unit[k], log[k] = u.unit, float(u.log)
+        if u.path in tail:
+            rows[k, vector.size + tail[u.path]] = 1.0
+            base[vector.size + tail[u.path]] = 0.0
+        else:
+            rows[k, : vector.size] = found[u.path]
+            base[: vector.size] -= found[u.path] * known[u.path]
+    return base, rows, unit, log
+
+
+def _slot_bucket(structure: Structure) -> int:
+    """Smooth slots of the program: one for a candidate beside a linear model, then powers of two."""
+    count = len(lower(structure).smooth)
+    return 1 if count <= 1 else 2 ** math.ceil(math.log2(count))
+
+
+def replace_use(readings, use):
+    """The readings with another choice of samples that update the state."""
+    return type(readings)(readings.values, jnp.asarray(use) * readings.use, readings.variance, readings.valid)
+
+
+def slackened(nuisances: Nuisances, share: float) -> ProcessNoise:
+    """Process noise that also forgives an unmodelled force of `share` of the elastic force."""
+    size = share * nuisances.omega**2 * nuisances.length
+    noise = nuisances.noise
+    return ProcessNoise(noise.force_variance, noise.acceleration_density + size**2 / nuisances.omega)
+
+
+def prior(unknowns: Sequence[Unknown], theta: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """Minus log-density of the unknowns beforehand, its gradient and a positive curvature."""
+    value, gradient, curvature = 0.0, np.zeros(theta.size), np.zeros(theta.size)
+    for k, (u, t) in enumerate(zip(unknowns, theta, strict=True)):
+        r = (t - u.center) / u.width
+        if u.heavy:
+            spread = DEGREES + r * r
+            value += (DEGREES + 1) / 2 * math.log(spread / DEGREES) + math.log(u.width) + _STUDENT
+            gradient[k] = (DEGREES + 1) * r / (u.width * spread)
+            curvature[k] = (DEGREES + 1) / (u.width**2 * spread)
+        else:
+            value += r * r / 2 + math.log(u.width) + 0.5 * math.log(2 * math.pi)
+            gradient[k], curvature[k] = r / u.width, 1 / u.width**2
+    return value, gradient, curvature
+
+
+_STUDENT = math.lgamma(DEGREES / 2) + 0.5 * math.log(DEGREES * math.pi) - math.lgamma((DEGREES + 1) / 2)

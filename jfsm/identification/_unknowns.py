@@ -1,0 +1,131 @@
+"""The numbers that a fit may change, with what is known of each beforehand."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..structures import Offset, Structure
+from ._nuisances import Nuisances
+
+TRUST = {"stiffness": 0.03, "damping": 0.25, "mass": 0.03}
+"""How far a model's own values are off as a rule, where its owner does not say."""
+DEGREES = 1.5
+"""Degrees of freedom of Student's law for own values: right to some per cent as a rule, but far off when wrong."""
+TYPICAL, TYPICAL_SPREAD = 0.15, 1.5
+"""An effect's size as a share of the elastic force, and the spread of its logarithm."""
+_OFFSET = 0.1
+_SCALE_SPREAD, _SCALE_SPREAD_GUESSED = 0.5, 3.0
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One number to be found: ``value = unit * exp(theta)`` if `log`, else ``unit * theta``.
+
+    `center` and `width` describe theta beforehand: a normal law, or Student's law with `DEGREES` degrees if `heavy`.
+    `record` is the record that it belongs to, None where all share it.
+    """
+
+    path: str
+    theta: float
+    unit: float
+    log: bool
+    center: float
+    width: float
+    heavy: bool = False
+    record: int | None = None
+    low: float = -math.inf
+    high: float = math.inf
+
+    def value(self, theta: float) -> float:
+        """The number itself."""
+        return self.unit * (math.exp(theta) if self.log else theta)
+
+    def slope(self, theta: float) -> float:
+        """Derivative of the number by theta."""
+        return self.unit * (math.exp(theta) if self.log else 1.0)
+
+
+def natural_size(structure: Structure, path: str, nuisances: Nuisances) -> float:
+    """Size of a parameter at which its force equals the elastic force of the motion."""
+    parameter = structure.entries()[path][0]
+    masses = np.asarray(structure.mass)
+    mass = float(np.mean(masses if masses.ndim == 1 else np.diag(masses)))
+    force = mass * nuisances.omega**2 * nuisances.length
+    return force**parameter.force * nuisances.length**parameter.length * nuisances.omega**-parameter.time
+
+
+def own_unknown(structure: Structure, path: str, trust: Mapping[str, float]) -> Unknown:
+    """A value that the model states: Student's law about it, as wide as it is trusted."""
+    value = structure.values()[path]
+    kind = path.split("@")[0]
+    width = next((w for name, w in trust.items() if path in structure.select(name)), TRUST.get(kind, 0.25))
+    if value == 0:  # nothing to be relative to: damping stated as none
+        raise ValueError(f"{path} is 0 and cannot be refitted as a share of itself; state a small value, or leave the term out.")
+    return Unknown(path, 0.0, value, True, 0.0, math.log1p(width), heavy=True)
+
+
+def free_unknown(structure: Structure, path: str, nuisances: Nuisances) -> Unknown:
+    """A value to be found from the data, with a wide law about where it stands."""
+    value = structure.values()[path]
+    positive = structure.entries()[path][0].positive
+    if positive and value != 0:
+        return Unknown(path, 0.0, value, True, 0.0, 3.0)
+    scale = natural_size(structure, path, nuisances)
+    scale = max(abs(value), TYPICAL * scale)
+    return Unknown(path, value / scale, scale, False, value / scale, 10.0, low=0.0 if positive else -math.inf)
+
+
+def effect_unknown(structure: Structure, path: str, nuisances: Nuisances) -> Unknown:
+    """The size of a candidate's effect: log-normal about a share of the elastic force, with the sign it has."""
+    value = structure.values()[path]
+    typical = TYPICAL * natural_size(structure, path, nuisances)
+    return Unknown(path, math.log(abs(value) / typical), math.copysign(typical, value), True, 0.0, TYPICAL_SPREAD)
+
+
+def with_offsets(structure: Structure, records: Sequence[Nuisances]) -> Structure:
+    """The structure with an offset on every channel that the records measure, zero where it has none."""
+    have = {sensor.at for sensor in structure.sensors if isinstance(sensor, Offset)}
+    for nuisances in records:
+        for channel in _offset_channels(nuisances):
+            if channel not in have:
+                structure, have = structure + Offset(0.0, at=channel), have | {channel}
+    return structure
+
+
+def _offset_channels(nuisances: Nuisances) -> list[tuple[str, int]]:
+    forces = [c for c in nuisances.record.channels if c[0] == "force" and np.any(np.asarray(nuisances.fine.force)[:, 0, c[1] - 1])]
+    return [*forces, *nuisances.channels]
+
+
+def nuisance_unknowns(structure: Structure, nuisances: Nuisances, index: int) -> list[Unknown]:
+    """Offsets, initial state and noise scales of one record; `structure` carries the offsets."""
+    found = []
+    values = structure.values()
+    for kind, j in _offset_channels(nuisances):
+        size = float(np.std(nuisances.record.channels[(kind, j)]))
+        unit = _OFFSET * size
+        path = f"offset@{kind}-{j}.b"
+        found.append(Unknown(path, values[path] / unit, unit, False, 0.0, 1.0, record=index))
+    if not nuisances.at_rest:
+        for name, guess, unit in (("x0", nuisances.x0, nuisances.length), ("v0", nuisances.v0, nuisances.length * nuisances.omega)):
+            for j, value in enumerate(guess):
+                found.append(Unknown(f"{name}@{j + 1}", value / unit, unit, False, value / unit, 1.0, record=index))
+    for c in range(len(nuisances.channels)):
+        width, reach = (_SCALE_SPREAD, 2.0) if nuisances.trusted[c] else (_SCALE_SPREAD_GUESSED, 8.0)
+        found.append(Unknown(f"noise@{c}", 0.0, 1.0, False, 0.0, width, record=index, low=-reach, high=reach))
+    return found
+
+
+def bounded(unknown: Unknown, low: float, high: float) -> Unknown:
+    """The unknown confined to values between `low` and `high`."""
+    ends = []
+    for end in (low, high):
+        if unknown.log:
+            share = end / unknown.unit
+            ends.append(math.log(share) if share > 0 else -math.inf)
+        else:
+            ends.append(end / unknown.unit)
+    low, high = min(ends), max(ends)
+    return replace(unknown, low=low, high=high, theta=min(max(unknown.theta, low), high))

@@ -1,0 +1,134 @@
+"""Samples that are not readings: limited by the recorder, or torn out of the curve."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import median_filter
+
+from jfsm.records._quantisation import quantisation_step
+
+CLIPPED_SAMPLES = 6  # at one end level; a continuous signal is there once
+CLIPPED_SAMPLES_QUANTISED = 12
+CLIPPED_OVER_NEIGHBOUR = 3  # times the samples of the level next to the end of a quantised channel
+SWITCHING = 0.9  # share of samples at the two ends above which a signal is a switch, not a limited curve
+APPROACH, DECELERATION = 0.1, 0.4  # how fast, and how little slowed, a curve must meet a level that cuts it off
+SPIKE_ROBUST, SPIKE_FLOORS = 8.0, 6.0  # a spike is this many robust deviations and this many noise floors off
+SURROUNDING = 101  # samples in which the robust deviation is taken
+OUTSIDE = 0.75  # share of a spike's height that must stand out of the range of the samples beside it
+# A sample minus the quintic through its six neighbours; one sample, and two, from the quintic through those beside.
+OFF_CURVE = np.array([-1.0, 6.0, -15.0, 20.0, -15.0, 6.0, -1.0]) / 20.0
+BRIDGE_ONE = np.array([[1.0, -6.0, 15.0, 15.0, -6.0, 1.0]]) / 20.0
+BRIDGE_TWO = np.array([[12.0, -63.0, 126.0, 63.0, -42.0, 9.0], [9.0, -42.0, 63.0, 126.0, -63.0, 12.0]]) / 105.0
+
+
+def clipped(y: ArrayLike) -> NDArray[np.bool_]:
+    """Which samples of a channel sit at the limit of the recorder.
+
+    Parameters
+    ----------
+    y : (n,) array
+
+    Returns
+    -------
+    mask : (n,) bool array
+
+    Notes
+    -----
+    Six samples equal to the largest (or smallest) value are a limit, if the curve runs into it at speed. A structure
+    that dwells at its extreme position, is held before a release, or rests, comes to that level gently. A quantised
+    channel meets its end levels anyway: it needs twelve samples, and three times as many as the level beside. A channel
+    that spends nine tenths of its time at both ends is a switch.
+    """
+    y = np.asarray(y, dtype=np.float64)
+    low, high = float(y.min()), float(y.max())
+    if low == high:
+        return np.zeros(y.size, dtype=bool)
+    step = quantisation_step(y)
+    masks = [_at_level(y, level, inward, step) for level, inward in ((high, -1.0), (low, 1.0))]
+    both = masks[0] | masks[1]
+    return both if both.mean() < SWITCHING else np.zeros(y.size, dtype=bool)
+
+
+def spikes(y: ArrayLike, std: float) -> NDArray[np.bool_]:
+    """Which samples of a channel are torn out of the curve their neighbours make.
+
+    Parameters
+    ----------
+    y : (n,) array
+    std : float
+        Noise floor of the channel, in its unit.
+
+    Returns
+    -------
+    mask : (n,) bool array
+        One sample or two side by side, off the running median of five by more than 6 floors, and off the quintic
+        through their neighbours by more than 8 robust standard deviations of the samples around.
+
+    Notes
+    -----
+    A jump, as dry friction leaves in an acceleration, is no spike: a spike stands out of the samples on both sides.
+    """
+    y = np.array(y, dtype=np.float64)
+    mask = np.zeros(y.size, dtype=bool)
+    if y.size < 2 * OFF_CURVE.size:
+        return mask
+    off_median = np.abs(y - median_filter(y, size=5, mode="nearest"))
+    disturbance = _off_curve(y)
+    limit = SPIKE_ROBUST * np.maximum(_deviation_around(disturbance), 1e-12 * np.ptp(y))
+    suspects = np.flatnonzero((off_median > SPIKE_FLOORS * std) & (disturbance > limit))
+    for i in suspects[np.argsort(-disturbance[suspects])]:  # the highest first: they disturb their neighbours
+        for bridge, first in ((BRIDGE_ONE, i), (BRIDGE_TWO, i), (BRIDGE_TWO, i - 1)):
+            if _bridged(y, first, bridge, float(limit[i])):
+                mask[first : first + len(bridge)] = True
+    return mask
+
+
+def _off_curve(y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distance of each sample from the quintic through its six neighbours."""
+    return np.abs(np.convolve(np.pad(y, 3, mode="reflect", reflect_type="odd"), OFF_CURVE, mode="valid"))
+
+
+def _bridged(y: NDArray[np.float64], first: int, bridge: NDArray[np.float64], limit: float) -> bool:
+    """Replace the samples of `y` that a bridge spans by its curve, if they are a spike."""
+    last = first + len(bridge)
+    if first < 3 or last + 3 > y.size:
+        return False
+    beside = np.concatenate([y[first - 3 : first], y[last : last + 3]])
+    curve = bridge @ beside
+    height = np.abs(y[first:last] - curve)
+    nearest = beside[1:-1]
+    outside = np.maximum(y[first:last] - nearest.max(), nearest.min() - y[first:last])
+    steepest = max(np.abs(np.diff(beside[:3])).max(), np.abs(np.diff(beside[3:])).max())
+    if np.any(height <= max(limit, steepest)) or np.any(outside < OUTSIDE * height):
+        return False
+    y[first:last] = curve
+    return True
+
+
+def _deviation_around(distance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Robust standard deviation in the surroundings of each sample."""
+    return 1.4826 * median_filter(distance, size=min(SURROUNDING, distance.size), mode="reflect")
+
+
+def _at_level(y: NDArray[np.float64], level: float, inward: float, step: float) -> NDArray[np.bool_]:
+    """Samples at one end level, if they are too many to have come there by themselves."""
+    nothing = np.zeros(y.size, dtype=bool)
+    mask = np.abs(y - level) <= 1e-9 * float(np.ptp(y))
+    if step > 0:
+        beside = int(np.count_nonzero(np.abs(y - (level + inward * step)) <= 0.5 * step))
+        enough = mask.sum() >= max(CLIPPED_SAMPLES_QUANTISED, CLIPPED_OVER_NEIGHBOUR * beside)
+    else:
+        enough = mask.sum() >= CLIPPED_SAMPLES
+    return mask if enough and _cut_off(y, mask, level) else nothing
+
+
+def _cut_off(y: NDArray[np.float64], mask: NDArray[np.bool_], level: float) -> bool:
+    """Whether the curve meets the level at speed, judged two and four samples before and after it stays there."""
+    starts = np.flatnonzero(mask[1:-1] & ~mask[:-2] & mask[2:]) + 1
+    ends = np.flatnonzero(mask[1:-1] & ~mask[2:] & mask[:-2]) + 1
+    near = np.concatenate([starts[starts >= 4] - 2, ends[ends < y.size - 4] + 2])
+    far = np.concatenate([starts[starts >= 4] - 4, ends[ends < y.size - 4] + 4])
+    if near.size == 0:
+        return False
+    last, before = np.abs(y[near] - level), np.abs(y[far] - y[near])
+    usual = float(np.sqrt(np.mean(np.diff(y) ** 2)))
+    return bool(np.median(last) / 2.0 >= APPROACH * usual and last.sum() >= DECELERATION * before.sum())

@@ -1,0 +1,159 @@
+"""How noisy a channel is, read from the channel itself."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import BSpline
+from scipy.linalg import solveh_banded
+
+from jfsm.records._quantisation import quantisation_step
+
+DEGREE = 5
+SPACINGS = (2, 3, 4, 6, 9, 14, 24, 60, 200)  # samples between knots, tried from fine to coarse
+SILENCE = 0.15  # a spline that explains less than this share of the variance has found no signal
+INFLATED = 0.85  # a robust estimate below this share of the residual's means isolated jumps, not noise
+SHORTEST = 16  # samples; fewer cannot tell a quintic from its noise
+
+# The second moment of a standard normal variable confined to |z| < 2, by which the core of a sample is read.
+CORE = 2.0
+CORE_VARIANCE = 0.7737413035
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """What a smooth curve leaves of a channel.
+
+    Attributes
+    ----------
+    std : float
+        Standard deviation of the noise, in the channel's unit.
+    effective_parameters : int
+        Coefficients of the chosen spline; a value of `smooth` carries about effective_parameters / n of the variance.
+    smooth : (n,) float array
+        The spline at the samples.
+    explained : float
+        Share of the channel's variance (about its mean) that is signal, 0 to 1.
+    spacing : int
+        Samples between knots. At the finest, 2, the signal fills the band and `std` may contain part of it.
+    dt : float
+        Sampling interval [s].
+    """
+
+    std: float
+    effective_parameters: int
+    smooth: NDArray[np.float64]
+    explained: float
+    spacing: int
+    dt: float
+
+    @property
+    def intensity(self) -> float:
+        """Spectral density of the continuous white noise with the same power, std² dt, in unit² s."""
+        return self.std**2 * self.dt
+
+    @property
+    def silent(self) -> bool:
+        """Whether smoothing leaves no signal: noise about a constant, or a signal as broad as noise."""
+        return self.explained < SILENCE
+
+
+def noise_floor(y: ArrayLike, dt: float) -> NoiseFloor:
+    """Noise of one uniformly sampled channel.
+
+    Quintic splines with uniform knots are fitted by least squares; generalised cross-validation chooses the spacing of
+    the knots. The residual gives the noise, unless the core of the residual or of the sixth difference is clearly
+    narrower: the jumps that dry friction leaves in an acceleration widen the residual, at a few samples only.
+
+    Parameters
+    ----------
+    y : (n,) array
+        At least 16 finite samples of the channel.
+    dt : float
+        Sampling interval [s].
+
+    Returns
+    -------
+    NoiseFloor
+
+    Raises
+    ------
+    ValueError
+        If `y` is not one column of at least 16 finite numbers, or `dt` is not positive.
+
+    Notes
+    -----
+    Exact for white noise only. Noise that is correlated over several samples is taken for signal.
+    """
+    y = np.asarray(y, dtype=np.float64)
+    if y.ndim != 1 or y.size < SHORTEST or not np.all(np.isfinite(y)):
+        raise ValueError(
+            f"`y` must be one channel of at least {SHORTEST} finite samples; it has shape {y.shape} and "
+            f"{np.count_nonzero(~np.isfinite(y))} values that are not finite. Pass one channel of a longer record."
+        )
+    if not (np.isfinite(dt) and dt > 0):
+        raise ValueError(f"`dt` must be a positive number of seconds; it is {dt}. Pass record.dt.")
+
+    spacing, parameters, smooth = _best_spline(y)
+    residual = y - smooth
+    freedom = y.size - parameters
+    variance = float(residual @ residual) / freedom
+    std = np.sqrt(variance)
+    narrowest = min(
+        np.sqrt(y.size / freedom) * _core_std(residual),
+        _core_std(np.diff(y, 6)) / np.sqrt(924.0),  # 924: the sum of the squared binomial coefficients of order 6
+    )
+    if narrowest < INFLATED * std:
+        std = narrowest
+    total = float(np.var(y, ddof=1))
+    smooth.flags.writeable = False
+    return NoiseFloor(
+        std=float(max(std, quantisation_step(y) / np.sqrt(12.0))),
+        effective_parameters=parameters,
+        smooth=smooth,
+        explained=max(0.0, 1.0 - variance / total) if total > 0 else 0.0,
+        spacing=spacing,
+        dt=float(dt),
+    )
+
+
+def _best_spline(y: NDArray[np.float64]) -> tuple[int, int, NDArray[np.float64]]:
+    """Spacing, number of coefficients and values of the spline with the smallest cross-validation score."""
+    n = y.size
+    best = (np.inf, 0, 0, y)
+    for spacing in SPACINGS:
+        spans = max(1, (n - 1) // spacing)
+        parameters = spans + DEGREE
+        if 2 * parameters > n + 2 * DEGREE:
+            continue
+        smooth = _least_squares_spline(y, spans)
+        residual = y - smooth
+        score = float(residual @ residual) / (n - parameters) ** 2
+        if score < best[0]:
+            best = (score, spacing, parameters, smooth)
+    return best[1:]
+
+
+def _least_squares_spline(y: NDArray[np.float64], spans: int) -> NDArray[np.float64]:
+    """Values at the samples of the quintic spline on `spans` equal intervals, by banded normal equations."""
+    position = np.linspace(0.0, spans, y.size)
+    knots = np.concatenate([np.zeros(DEGREE), np.arange(spans + 1.0), np.full(DEGREE, float(spans))])
+    basis = BSpline.design_matrix(position, knots, DEGREE)
+    normal = (basis.T @ basis).todia()
+    bands = np.zeros((DEGREE + 1, spans + DEGREE))
+    for offset, diagonal in zip(normal.offsets, normal.data, strict=True):
+        if offset >= 0:
+            bands[DEGREE - offset] = diagonal
+    return basis @ solveh_banded(bands, basis.T @ y)
+
+
+def _core_std(sample: NDArray[np.float64]) -> float:
+    """Standard deviation of the normal core of a zero-mean sample, whatever lies in its tails."""
+    size = np.abs(sample)
+    std = float(np.quantile(size, 0.3)) / 0.3853  # 30 % of a normal sample lie within 0.3853 standard deviations
+    for _ in range(20):
+        core = size[size <= CORE * std]
+        if core.size == 0 or std == 0:
+            return std
+        std = float(np.sqrt(np.mean(core**2) / CORE_VARIANCE))
+    return std

@@ -1,0 +1,130 @@
+"""Another sampling rate, without aliasing and without a shift in time."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.special import i0
+
+Samples = NDArray[np.float64]
+
+LOBES = 32  # of the windowed sinc on each side
+KAISER = 9.0  # side lobes of its window below −90 dB; the transition band is then 0.18 of the cut-off wide
+PASSBAND = 0.91  # cut-off over the lower of the two Nyquist frequencies: the transition ends there
+CLOSE = 0.1  # samples nearer than this share of the median step are one reading
+GAP = 3.0  # median steps without a sample from which on an interpolation is worth a word
+ROUNDED = 0.25  # share of a step up to which the digits of a time stamp may be missing
+MEMORY, FITTED = 48, 1024  # order of the prediction beyond the ends, and samples it is learnt from
+BATCH = 1 << 20  # products held at once
+
+
+def resampled(time: Samples, values: Samples, rate: float, uneven: bool) -> tuple[Samples, Samples, str]:
+    """Instants, samples (n, channels) at `rate` [Hz], and a sentence that says what was done.
+
+    Raises
+    ------
+    ValueError
+        If `rate` is not positive, or leaves fewer than two samples.
+    """
+    duration = time[-1] - time[0]
+    if not (np.isfinite(rate) and rate > 0 and duration * rate >= 1.0):
+        raise ValueError(
+            f"`rate` must be a positive number of samples per second with at least two of them in {duration:.6g} s; "
+            f"it was {rate}. Pass at least {1 / duration:.6g}."
+        )
+    note = f"Resampled from {(time.size - 1) / duration:.6g} to {rate:.6g} Hz"
+    if uneven and (resolution := _rounding(time)):
+        slope, start = np.polyfit(np.arange(time.size), time, 1)
+        time = start + slope * np.arange(time.size)
+        duration = time[-1] - time[0]
+        note += f"; its uniform clock was written to {resolution:.3g} s only"
+    elif uneven:
+        values, gap = _even(time, values)
+        note += f", by cubic interpolation of uneven samples with gaps of up to {gap:.6g} s"
+    source_rate = (values.shape[0] - 1) / duration
+    count = int(np.floor(duration * rate * (1.0 + 1e-12))) + 1
+    instants = time[0] + np.arange(count) / rate
+    return instants, _filtered(values, np.arange(count) * (source_rate / rate), rate / source_rate), note + "."
+
+
+def _rounding(time: Samples) -> float:
+    """The unit [s] to which the stamps of a uniform clock were rounded, 0 if the clock is not uniform."""
+    steps = np.diff(time)
+    levels = np.unique(np.round(steps, 9))
+    if levels.size < 2:
+        return 0.0
+    unit = float(np.min(np.diff(levels)))
+    if unit > ROUNDED * float(np.mean(steps)) or np.max(np.abs(steps / unit - np.round(steps / unit))) > 0.01:
+        return 0.0
+    index = np.arange(time.size)
+    drift = time - np.polyval(np.polyfit(index, time, 1), index)
+    return unit if float(np.max(np.abs(drift))) <= unit else 0.0  # otherwise the steps themselves differ
+
+
+def _even(time: Samples, values: Samples) -> tuple[Samples, float]:
+    """The samples on the uniform clock of the median step, and the longest step [s] that had to be bridged."""
+    median = float(np.median(np.diff(time)))
+    # Two readings at almost the same instant would make the spline follow their noise far beyond both.
+    reading = np.concatenate([[0], np.cumsum(np.diff(time) > CLOSE * median)])
+    weight = np.bincount(reading)
+    merged = np.bincount(reading, time) / weight
+    merged[0], merged[-1] = time[0], time[-1]
+    columns = [np.bincount(reading, column) / weight for column in values.T]
+    uniform = np.linspace(time[0], time[-1], max(2, round((time[-1] - time[0]) / median) + 1))
+    together = np.stack(columns, axis=1) if columns else np.empty((merged.size, 0))
+    return CubicSpline(merged, together)(uniform), float(np.max(np.diff(merged)))
+
+
+def _filtered(values: Samples, position: Samples, ratio: float) -> Samples:
+    """Uniform samples at fractional positions, below the lower of both band limits, by a Kaiser-windowed sinc."""
+    # The cut-off leaves room for the transition only where something could fold back.
+    cutoff = PASSBAND * ratio if ratio < 1.0 else 1.0
+    reach = LOBES / cutoff
+    taps = np.arange(-int(np.floor(reach)), int(np.floor(reach)) + 2)
+    padded = _extended(values, taps.size)
+    result = np.empty((position.size, values.shape[1]))
+    step = max(1, BATCH // (taps.size * max(1, values.shape[1])))
+    for start in range(0, position.size, step):
+        some = position[start : start + step]
+        nearest = np.floor(some).astype(int)
+        distance = some[:, None] - nearest[:, None] - taps
+        inside = np.clip(1.0 - (distance / reach) ** 2, 0.0, None)
+        weight = np.sinc(cutoff * distance) * i0(KAISER * np.sqrt(inside)) * (np.abs(distance) <= reach)
+        weight /= weight.sum(axis=1, keepdims=True)  # a constant stays what it is
+        window = padded[nearest[:, None] + taps + taps.size]
+        result[start : start + step] = np.einsum("st,stc->sc", weight, window)
+    return result
+
+
+def _extended(values: Samples, margin: int) -> Samples:
+    """The samples continued beyond both ends by linear prediction, so that the filter meets no edge."""
+    continued = [
+        np.concatenate([_predicted(column[::-1], margin)[::-1], column, _predicted(column, margin)])
+        for column in values.T
+    ]
+    return np.stack(continued, axis=1) if continued else np.empty((values.shape[0] + 2 * margin, 0))
+
+
+def _predicted(past: Samples, count: int) -> Samples:
+    """The next samples of a series as an autoregression continues it: oscillations go on, noise does not."""
+    level = float(past[-FITTED:].mean())
+    recent = past[-FITTED:] - level
+    coefficients = _burg(recent, min(MEMORY, recent.size // 3))
+    order = coefficients.size
+    series = np.concatenate([recent, np.zeros(count)])
+    for i in range(recent.size, series.size):
+        series[i] = coefficients @ series[i - order : i][::-1]
+    return series[recent.size :] + level
+
+
+def _burg(series: Samples, order: int) -> Samples:
+    """Coefficients of the last `order` samples, latest first, by Burg's method: a prediction that cannot grow."""
+    forward, backward = series[1:], series[:-1]
+    coefficients = np.empty(0)
+    for _ in range(order):
+        power = float(forward @ forward + backward @ backward)
+        if power <= 1e-24 * float(series @ series):
+            break
+        reflection = 2.0 * float(forward @ backward) / power
+        coefficients = np.concatenate([coefficients - reflection * coefficients[::-1], [reflection]])
+        forward, backward = (forward - reflection * backward)[1:], (backward - reflection * forward)[:-1]
+    return coefficients

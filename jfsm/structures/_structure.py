@@ -1,0 +1,189 @@
+"""The simulation its owner believes in: masses, terms and sensors."""
+
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._types import as_array
+from ._sensors import AbstractSensor
+from ._term import AbstractTerm, Parameter
+from .terms import LinearDamping, LinearStiffness
+
+MASS = Parameter("mass", force=1, length=-1, time=2, meaning="mass")
+
+
+class Structure(eqx.Module):
+    r"""M ẍ + Σ Bᵀ f(B x, B v, z, t) = g(t), and what the sensors make of it.
+
+    Parameters
+    ----------
+    mass : (dof,) or (dof, dof) array
+        Masses [kg], or a symmetric positive definite mass matrix.
+    terms : sequence of terms
+        Everything else on the left-hand side; place (0, 1) is between ground and degree of freedom 1.
+    sensors : sequence of sensor effects
+
+    Raises
+    ------
+    ValueError
+        If a mass is not positive, the mass matrix is not symmetric, or a term or sensor names a degree of freedom
+        that the structure does not have.
+    """
+
+    mass: Float[Array, "..."]
+    terms: tuple[AbstractTerm, ...]
+    sensors: tuple[AbstractSensor, ...]
+    trust: tuple[tuple[str, float], ...] = eqx.field(static=True)
+
+    def __init__(
+        self,
+        mass: Any,
+        terms: Iterable[AbstractTerm] = (),
+        sensors: Iterable[AbstractSensor] = (),
+        trust: Mapping[str, float] | Iterable[tuple[str, float]] = (),
+    ):
+        masses = as_array(mass, "mass", (0, 1, 2))
+        masses = np.atleast_1d(masses)
+        _check_mass(masses)
+        self.mass = jnp.asarray(masses)
+        self.terms = tuple(terms)
+        self.sensors = tuple(sensors)
+        self.trust = tuple(dict(trust).items())
+        for term in self.terms:
+            if not isinstance(term, AbstractTerm):
+                raise TypeError(f"`terms` must hold terms such as jfsm.LinearStiffness(9.0, at=(0, 1)); got {term!r}.")
+            if max(term.at) > self.dof:
+                raise ValueError(f"`at`={term.at} of {term.kind} names a degree of freedom beyond the {self.dof} of the structure.")
+        for sensor in self.sensors:
+            if not isinstance(sensor, AbstractSensor):
+                raise TypeError(f"`sensors` must hold sensor effects such as jfsm.ForceGain(0.1, at=('force', 1)); got {sensor!r}.")
+            if sensor.at[1] > self.dof:
+                raise ValueError(f"`at`={sensor.at} of {sensor.kind} names a degree of freedom beyond the {self.dof} of the structure.")
+
+    @classmethod
+    def sdof(cls, mass: float, stiffness: float, damping: float = 0.0) -> "Structure":
+        """One mass [kg] on a spring [N/m] and a dashpot [N s/m] to ground."""
+        return cls.chain([mass], [stiffness], [damping])
+
+    @classmethod
+    def chain(cls, mass: Any, stiffness: Any, damping: Any = None) -> "Structure":
+        """Masses in a row; spring and dashpot i join mass i - 1 (ground for the first) to mass i."""
+        masses = as_array(mass, "mass", 1)
+        springs = as_array(stiffness, "stiffness", 1)
+        dashpots = np.zeros_like(springs) if damping is None else as_array(damping, "damping", 1)
+        for name, values in (("stiffness", springs), ("damping", dashpots)):
+            if values.size != masses.size:
+                raise ValueError(f"`{name}` must have one value per mass ({masses.size}); got {values.size}.")
+        links = [(i, i + 1) for i in range(masses.size)]
+        terms = [LinearStiffness(k, at=at) for k, at in zip(springs, links, strict=True)]
+        return cls(masses, [*terms, *(LinearDamping(c, at=at) for c, at in zip(dashpots, links, strict=True))])
+
+    @property
+    def dof(self) -> int:
+        """Number of degrees of freedom."""
+        return int(self.mass.shape[0])
+
+    @property
+    def links(self) -> tuple[tuple[int, int], ...]:
+        """Places that already carry a term, in the order of their first term."""
+        return tuple(dict.fromkeys(term.at for term in self.terms))
+
+    def __add__(self, other: AbstractTerm | AbstractSensor) -> "Structure":
+        if isinstance(other, AbstractTerm):
+            return Structure(self.mass, (*self.terms, other), self.sensors, self.trust)
+        if isinstance(other, AbstractSensor):
+            return Structure(self.mass, self.terms, (*self.sensors, other), self.trust)
+        return NotImplemented
+
+    def uncertain(self, **relative: float) -> "Structure":
+        """The same structure with stated trust: ``uncertain(stiffness=0.05)`` says stiffnesses are right to 5 %."""
+        for name, value in relative.items():
+            if not value > 0:
+                raise ValueError(f"The uncertainty of `{name}` must be a positive share such as 0.05; got {value!r}.")
+            if not self.select(name):
+                raise ValueError(f"`{name}` names no parameter of this structure; it has {', '.join(self.values())}.")
+        return Structure(self.mass, self.terms, self.sensors, {**dict(self.trust), **relative})
+
+    def entries(self) -> dict[str, tuple[Parameter, Float[Array, ""]]]:
+        """Every number of the structure by path (``mass@1``, ``stiffness@0-1.k``), with what it is."""
+        found: dict[str, tuple[Parameter, Float[Array, ""]]] = {}
+        diagonal = self.mass if self.mass.ndim == 1 else jnp.diag(self.mass)
+        for i in range(self.dof):
+            found[f"mass@{i + 1}"] = (MASS, diagonal[i])
+        for part in (*self.terms, *self.sensors):
+            for parameter in part.parameters:
+                path = base = f"{part.kind}@{part.place}.{parameter.name}"
+                count = 2
+                while path in found:  # two terms of one law at one link
+                    path, count = f"{base}#{count}", count + 1
+                found[path] = (parameter, getattr(part, parameter.name))
+        return found
+
+    def values(self) -> dict[str, float]:
+        """Every number of the structure by path."""
+        return {path: float(value) for path, (_, value) in self.entries().items()}
+
+    def select(self, name: str) -> tuple[str, ...]:
+        """Paths that `name` means: a path itself, or a bare kind such as ``"mass"`` or ``"stiffness@0-1"``."""
+        return tuple(path for path in self.entries() if path == name or re.match(rf"{re.escape(name)}[@.]", path))
+
+    def with_values(self, values: Mapping[str, float]) -> "Structure":
+        """The same structure with other numbers, by path."""
+        unknown = [path for path in values if path not in self.entries()]
+        if unknown:
+            raise ValueError(f"{unknown[0]!r} names no parameter of this structure; it has {', '.join(self.entries())}.")
+        mass = np.array(self.mass)
+        paths = iter(self.entries())
+        for i in range(self.dof):
+            value = values.get(next(paths))
+            if value is not None:
+                mass[i if mass.ndim == 1 else (i, i)] = value
+        parts = []
+        for part in (*self.terms, *self.sensors):
+            for parameter in part.parameters:
+                value = values.get(next(paths))
+                if value is not None:
+                    part = eqx.tree_at(lambda p, name=parameter.name: getattr(p, name), part, jnp.asarray(float(value)))
+            parts.append(part)
+        n = len(self.terms)
+        return Structure(mass, parts[:n], parts[n:], self.trust)
+
+    def describe(self, units: Mapping[str, str] | None = None) -> list[str]:
+        """One line per number, with units."""
+        force, length = (units or {}).get("force", "N"), (units or {}).get("displacement", "m")
+        lines = []
+        for path, (parameter, value) in self.entries().items():
+            unit = "kg" if path.startswith("mass@") and (force, length) == ("N", "m") else parameter.unit(force, length)
+            lines.append(f"{path} = {float(value):.6g} {unit}")
+        return lines + [f"{term.kind}@{term.place}" for term in self.terms if not term.parameters]
+
+    def save(self, path: str | Path) -> None:
+        """Write the structure as TOML; the file appears whole or not at all."""
+        from ._toml import save
+
+        save(self, path)
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Structure":
+        """Read a structure that `save` wrote, or one written by hand."""
+        from ._toml import load
+
+        return load(path)
+
+
+def _check_mass(mass: np.ndarray) -> None:
+    if mass.ndim == 1:
+        if mass.size == 0 or np.any(mass < 0):
+            raise ValueError(f"`mass` must hold at least one mass, none negative; got {mass.tolist()}.")
+        return
+    if mass.shape[0] != mass.shape[1] or not np.allclose(mass, mass.T):
+        raise ValueError(f"`mass` as a matrix must be square and symmetric; got shape {mass.shape}.")
+    smallest = float(np.linalg.eigvalsh(mass)[0])
+    if smallest <= 0:
+        raise ValueError(f"`mass` as a matrix must be positive definite; its smallest eigenvalue is {smallest:g}.")

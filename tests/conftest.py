@@ -1,0 +1,30 @@
+"""Settings and fixtures of the whole suite: double precision, no silent broadcasting across ranks, seeded keys."""
+
+import os
+from pathlib import Path
+
+import jax
+import pytest
+from jaxtyping import Array, Key
+
+jax.config.update("jax_enable_x64", True)
+jax.config.update("jax_numpy_rank_promotion", "raise")
+
+
+@pytest.fixture
+def key() -> Key[Array, ""]:
+    """Source of randomness, the same in every run."""
+    return jax.random.key(20070423)
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Folder of measured records: ``JFSM_DATA``, or ``../shared/data`` beside the checkout."""
+    default = Path(__file__).resolve().parents[2] / "shared" / "data"
+    folder = Path(os.environ.get("JFSM_DATA", default))
+    if folder.is_dir():
+        return folder
+    message = f"measured records are missing: {folder} is not a folder; set JFSM_DATA to where they are"
+    if os.environ.get("CI") == "true":
+        pytest.fail(message)
+    pytest.skip(message)

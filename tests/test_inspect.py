@@ -1,0 +1,132 @@
+"""The first page of an examination says what is wrong with a record, and nothing when nothing is."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from jfsm.records import Record, noise_floor, silent_forces
+
+T = np.arange(2000) * 0.01
+RNG = np.random.default_rng(0)
+FORCE = np.cos(6.0 * T) + np.cos(11.0 * T + 1.0) + 0.01 * RNG.standard_normal(T.size)
+MOTION = np.sin(6.0 * T) + 0.5 * np.sin(11.0 * T) + 0.01 * RNG.standard_normal(T.size)
+
+
+def messages(record, severity=None, channel=None):
+    return [
+        finding.message
+        for finding in record.inspect().findings
+        if severity in (None, finding.severity) and channel in (None, finding.channel)
+    ]
+
+
+def test_a_sound_record_raises_no_warning_and_has_its_figures():
+    inspection = Record(T, force=FORCE, displacement=MOTION, name="run 7").inspect()
+    assert [finding for finding in inspection.findings if finding.severity == "warning"] == []
+    assert (inspection.name, inspection.samples) == ("run 7", 2000)
+    assert inspection.sample_rate == pytest.approx(100.0)
+    force, motion = inspection.channels
+    assert (force.channel, motion.channel, motion.unit) == ("force 1", "displacement 1", "m")
+    assert motion.noise == pytest.approx(0.01, rel=0.1)
+    assert motion.frequency == pytest.approx(6.0 / (2 * np.pi), abs=0.05)
+    assert (motion.clipped, motion.spikes, motion.quantisation, motion.noise_only) == (0, 0, 0.0, False)
+
+
+@pytest.mark.parametrize(
+    ("samples", "severity", "message"),
+    [
+        (np.clip(MOTION, -0.8, 0.8), "warning", "sit at the limit of -0.8 or 0.8 m: clipped"),
+        (MOTION + 9.0 * (np.arange(2000) == 700), "warning", "1 of 2000 samples are spikes"),
+        (MOTION + 0.3, "info", "Offset of 0.3"),
+        (np.round(MOTION / 0.25) * 0.25, "warning", "Quantised in steps of 0.25 m"),
+        (np.round(MOTION / 0.02) * 0.02, "info", "Quantised in steps of 0.02 m"),
+        (np.full(2000, 4.0), "warning", "Constant at 4 m. Leave a dead channel out"),
+        (MOTION + 0.3 * RNG.standard_normal(2000), "warning", "Noise of 0.3"),
+        (RNG.standard_normal(2000), "info", "Noise only"),
+        (np.sin(2 * np.pi * 20.0 * T), "warning", "The signal reaches the band limit"),
+        (np.sin(2 * np.pi * 20.0 * T), "warning", "Strongest at 20 Hz: 400 periods of 5 samples"),
+        (np.sin(6.0 * T), "info", "Amplitude stays within 1 of 10 bands"),
+    ],
+)
+def test_what_is_wrong_with_a_channel_is_said(samples, severity, message):
+    assert any(message in found for found in messages(Record(T, displacement=samples), severity, "displacement 1"))
+
+
+def test_a_decay_covers_its_amplitudes():
+    record = Record(T, displacement=np.exp(-0.2 * T) * np.sin(6.0 * T))
+    assert not any("Amplitude" in found for found in messages(record))
+    assert record.inspect().channels[0].coverage == 1.0
+
+
+@pytest.mark.parametrize("force", [None, 0.1 * RNG.standard_normal(2000), np.zeros(2000)])
+def test_a_record_without_force_is_called_a_free_decay(force):
+    record = Record(T, force=force, displacement=MOTION)
+    assert any("free decay" in found for found in messages(record, "info", "record"))
+
+
+def _driven(force):
+    """Displacement of a lightly damped oscillator at 2 Hz under a force held over each sample."""
+    omega, zeta, dt = 4 * np.pi, 0.02, T[1]
+    pole = np.exp((-zeta + 1j * np.sqrt(1 - zeta**2)) * omega * dt)
+    return np.asarray(lfilter([0.0, dt**2], [1.0, -2 * pole.real, abs(pole) ** 2], force))
+
+
+def test_a_white_force_that_the_response_follows_is_not_silent():
+    white = np.random.default_rng(1).standard_normal(T.size)
+    motion = _driven(white)
+    noise = 0.02 * motion.std() * np.random.default_rng(2).standard_normal(T.size)
+    assert noise_floor(white, T[1]).silent
+    assert silent_forces(Record(T, force=white, displacement=motion + noise)) == ()
+    assert silent_forces(Record(T, force=white)) == ()  # nothing contradicts it
+
+
+def test_noise_that_no_response_follows_is_silent_however_often_one_looks():
+    decay = np.exp(-0.2 * T) * np.sin(6.0 * T)
+    found = [
+        silent_forces(Record(T, force=np.random.default_rng(seed).standard_normal(T.size), displacement=decay))
+        for seed in range(100)
+    ]
+    assert found == [(1,)] * 100
+
+
+def test_a_driven_record_is_not_called_a_free_decay():
+    assert not any("free decay" in found for found in messages(Record(T, force=FORCE, displacement=MOTION)))
+    assert not any("free decay" in found for found in messages(Record(T, base_acceleration=FORCE, displacement=MOTION)))
+
+
+def test_a_record_without_response_is_warned_of():
+    assert any("No response was measured" in found for found in messages(Record(T, force=FORCE), "warning"))
+
+
+def test_gaps_and_uneven_steps_are_reported_with_the_remedy():
+    kept = np.delete(np.arange(2000), [500, *range(1000, 1040)])
+    record = Record(T[kept], displacement=MOTION[kept])
+    warnings = messages(record, "warning", "record")
+    assert any("record.resample(100)" in found for found in warnings)
+    assert any("2 gaps, of at most 0.41 s (after t = 9.99 s). Do not fit across it" in found for found in warnings)
+    few = Record(np.delete(T, 500), displacement=np.delete(MOTION, 500))
+    assert any("1 gaps, of at most 0.02 s" in found for found in messages(few, "info", "record"))
+    assert record.inspect().channels[0].noise == pytest.approx(0.01, rel=0.15)
+
+
+def test_notes_of_the_record_are_repeated():
+    assert messages(Record(T, displacement=MOTION).noted("cut by hand"), "info", "record")[0] == "cut by hand"
+
+
+def test_a_very_short_record_is_examined_without_its_noise():
+    inspection = Record(T[:10], displacement=MOTION[:10]).inspect()
+    assert inspection.channels[0].noise is None
+    assert any("Fewer than 16 samples" in finding.message for finding in inspection.findings)
+
+
+def test_the_page_is_plain_data_and_can_be_printed(capsys):
+    inspection = Record(T, force=FORCE, displacement=MOTION + 0.3, base_acceleration=FORCE, name="run 7").inspect()
+    plain = json.loads(json.dumps(inspection.to_dict()))
+    assert [channel["channel"] for channel in plain["channels"]] == ["force 1", "displacement 1", "base_acceleration"]
+    assert set(plain["findings"][0]) == {"severity", "channel", "message"}
+    inspection.print()
+    shown = capsys.readouterr().out
+    assert "run 7: 2000 samples over 19.99 s at 100 Hz" in shown
+    assert "displacement 1: Offset of 0.3" in shown

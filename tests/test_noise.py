@@ -1,0 +1,185 @@
+"""The noise floor, and samples that are no readings."""
+
+import time
+
+import numpy as np
+import pytest
+
+from jfsm.records import clipped, noise_floor, spikes
+
+DT = 0.02
+
+
+def friction_oscillator(friction: float, seed: int, n: int = 3000) -> dict[str, np.ndarray]:
+    """Channels of a hardening oscillator with a Coulomb slider, integrated in small steps."""
+    rng = np.random.default_rng(seed)
+    steps = 20
+    frequency, phase = rng.uniform(0.5, 9.0, (12, 1)), rng.uniform(0.0, 2 * np.pi, (12, 1))
+    force = np.cos(frequency * np.arange(n * steps) * DT / steps + phase).sum(0) / 3.0
+    x = v = 0.0
+    rows = np.empty((n, 4))
+    for i, g in enumerate(force.tolist()):
+        applied = g - 9.0 * x - 0.12 * v - 10.0 * x**3
+        sticks = friction > 0 and abs(v) < 3e-3 and abs(applied) <= friction
+        if sticks:
+            v = 0.0
+        acceleration = 0.0 if sticks else applied - friction * np.sign(v or applied)
+        if i % steps == 0:
+            rows[i // steps] = x, v, acceleration, g
+        v += acceleration * DT / steps
+        x += v * DT / steps
+    return dict(zip(("displacement", "velocity", "acceleration", "force"), rows.T, strict=True))
+
+
+OSCILLATORS = {friction: friction_oscillator(friction, seed=3) for friction in (0.0, 0.5)}
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+@pytest.mark.parametrize("kind", ["displacement", "velocity", "acceleration", "force"])
+@pytest.mark.parametrize("level", [0.001, 0.01, 0.05])
+def test_noise_is_found_within_ten_percent_also_where_friction_makes_jumps(friction, kind, level):
+    signal = OSCILLATORS[friction][kind]
+    std = level * signal.std()
+    floor = noise_floor(signal + std * np.random.default_rng(1).standard_normal(signal.size), DT)
+    assert floor.std == pytest.approx(std, rel=0.1)
+    # Jumps are isolated losses: the curve explains the rest.
+    assert floor.explained > 0.95 - level
+    assert not floor.silent
+
+
+def test_the_smooth_curve_is_nearer_to_the_truth_than_the_samples():
+    signal = OSCILLATORS[0.0]["displacement"]
+    std = 0.05 * signal.std()
+    floor = noise_floor(signal + std * np.random.default_rng(2).standard_normal(signal.size), DT)
+    expected = std * np.sqrt(floor.effective_parameters / signal.size)
+    assert np.std(floor.smooth - signal) == pytest.approx(expected, rel=0.3)
+    assert floor.spacing > 6
+
+
+def test_the_floor_scales_with_the_unit_and_ignores_the_offset():
+    y = OSCILLATORS[0.5]["acceleration"] + 0.01 * np.random.default_rng(3).standard_normal(3000)
+    one, other = noise_floor(y, DT), noise_floor(1e3 * y + 5e4, DT)
+    assert other.std == pytest.approx(1e3 * one.std, rel=1e-6)
+    assert other.explained == pytest.approx(one.explained, rel=1e-6)
+
+
+def test_pure_noise_is_silent_and_a_signal_in_it_is_not():
+    noise = np.random.default_rng(4).standard_normal(3000)
+    assert noise_floor(noise, DT).silent
+    assert noise_floor(noise, DT).std == pytest.approx(1.0, rel=0.05)
+    assert not noise_floor(noise + np.sin(np.arange(3000) * 0.1), DT).silent
+    constant = noise_floor(np.full(100, 3.0), DT)
+    assert constant.silent and constant.std < 1e-12
+
+
+def test_quantisation_bounds_the_floor_from_below():
+    t = np.arange(3000) * DT
+    step = 0.01
+    floor = noise_floor(np.round(np.exp(-0.3 * t) * np.sin(t) / step) * step, DT)
+    assert floor.std >= step / np.sqrt(12.0)
+
+
+def test_intensity_is_the_variance_times_the_interval():
+    floor = noise_floor(np.random.default_rng(5).standard_normal(500), 0.25)
+    assert floor.intensity == pytest.approx(floor.std**2 * 0.25)
+
+
+def test_the_result_is_read_only():
+    with pytest.raises(ValueError, match="read-only"):
+        noise_floor(np.arange(50.0) ** 2, DT).smooth[0] = 1.0
+
+
+def test_a_long_channel_takes_no_more_than_seconds():
+    y = np.sin(np.arange(100_000) * 0.1) + 0.01 * np.random.default_rng(6).standard_normal(100_000)
+    start = time.perf_counter()
+    assert noise_floor(y, DT).std == pytest.approx(0.01, rel=0.03)
+    assert time.perf_counter() - start < 10.0
+
+
+@pytest.mark.parametrize("y", [np.zeros(15), np.zeros((50, 2)), np.full(50, np.nan)])
+def test_what_is_no_channel_is_refused(y):
+    with pytest.raises(ValueError, match="`y` must be one channel of at least 16 finite samples; it has shape"):
+        noise_floor(y, DT)
+
+
+@pytest.mark.parametrize("dt", [0.0, -1.0, np.nan])
+def test_an_interval_that_is_not_positive_is_refused(dt):
+    with pytest.raises(ValueError, match="`dt` must be a positive number of seconds; it is"):
+        noise_floor(np.arange(50.0), dt)
+
+
+def test_clipped_samples_are_those_at_the_limit():
+    y = OSCILLATORS[0.0]["displacement"]
+    limit = 0.7 * np.abs(y).max()
+    noisy = y + 0.01 * y.std() * np.random.default_rng(7).standard_normal(y.size)
+    np.testing.assert_array_equal(clipped(np.clip(noisy, -limit, limit)), np.abs(noisy) >= limit)
+    assert not clipped(noisy).any()
+
+
+def test_one_sided_limits_are_found():
+    y = np.sin(np.arange(2000) * 0.05)
+    np.testing.assert_array_equal(clipped(np.minimum(y, 0.8)), y >= 0.8)
+
+
+def test_a_quantised_channel_is_not_clipped_for_meeting_its_end_levels():
+    y = np.sin(np.arange(20_000) * 0.013)
+    coarse = np.round(y / 0.02) * 0.02
+    assert np.count_nonzero(coarse == coarse.max()) > 12
+    assert not clipped(coarse).any()
+    cut = np.clip(coarse, -0.5, 0.5)
+    np.testing.assert_array_equal(clipped(cut), np.abs(cut) == 0.5)
+
+
+def _decay(samples: int) -> np.ndarray:
+    """Motion after release from 1 without speed, 20 samples a period."""
+    omega, zeta = 2 * np.pi / 20.0, 0.02
+    k = np.arange(samples)
+    return np.exp(-zeta * omega * k) * (np.cos(omega * k) + zeta * np.sin(omega * k))
+
+
+UNCLIPPED = {
+    "switched input": np.sign(np.sin(np.arange(500) * 0.1)),
+    "dead channel": np.full(100, 2.0),
+    "held and released": np.concatenate([np.ones(300), _decay(700)]),
+    "impact": np.concatenate([np.zeros(300), np.sin(np.arange(40) * np.pi / 40), np.zeros(300)]),
+    "positioning move": np.cos(np.interp(np.arange(900), [0, 300, 600, 900], [0, np.pi, np.pi, 2 * np.pi])),
+}
+
+
+@pytest.mark.parametrize("case", UNCLIPPED)
+def test_levels_that_are_reached_gently_or_switched_are_not_clipped(case):
+    assert not clipped(UNCLIPPED[case]).any()
+
+
+def test_spikes_of_one_and_two_samples_are_found_and_nothing_else():
+    rng = np.random.default_rng(8)
+    y = OSCILLATORS[0.0]["velocity"].copy()
+    std = 0.01 * y.std()
+    y += std * rng.standard_normal(y.size)
+    torn = np.zeros(y.size, dtype=bool)
+    torn[[200, 700, 701, 1500, 2400, 2401]] = True
+    y[torn] += 3.0 * y.std()
+    np.testing.assert_array_equal(spikes(y, std), torn)
+
+
+@pytest.mark.parametrize("samples_per_period", [9, 20, 200])
+def test_crests_of_an_oscillation_are_no_spikes(samples_per_period):
+    y = np.sin(2 * np.pi * np.arange(3000) / samples_per_period)
+    assert not spikes(y, 1e-6).any()
+
+
+def test_the_jumps_of_friction_are_no_spikes():
+    y = OSCILLATORS[0.5]["acceleration"]
+    std = 0.01 * y.std()
+    found = spikes(y + std * np.random.default_rng(9).standard_normal(y.size), std)
+    assert found.sum() <= 2  # of some hundred jumps
+
+
+@pytest.mark.parametrize("kind", ["displacement", "velocity", "force"])
+def test_a_record_without_noise_has_no_spikes_where_friction_bends_it(kind):
+    y = OSCILLATORS[0.5][kind]
+    assert spikes(y, noise_floor(y, DT).std).sum() <= 2
+
+
+def test_a_channel_too_short_to_judge_has_no_spikes():
+    assert not spikes(np.array([0.0, 0.0, 9.0, 0.0]), 0.1).any()

@@ -1,0 +1,257 @@
+"""Records from files, and back."""
+
+import json
+
+import numpy as np
+import pytest
+import scipy.io
+
+from jfsm.records import Record, read
+
+T = np.arange(100) * 0.02
+U = np.cos(3.0 * T)
+Y = np.sin(3.0 * T)
+
+
+def _save(path, **arrays):
+    if path.suffix == ".npz":
+        np.savez(path, **arrays)
+    elif path.suffix == ".mat":
+        scipy.io.savemat(path, arrays)
+    else:
+        columns = np.column_stack(list(arrays.values()))
+        np.savetxt(path, columns, delimiter=",", header=",".join(arrays), comments="", fmt="%.17g")
+    return path
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz", ".mat"])
+def test_channels_are_named_and_their_units_converted(tmp_path, suffix):
+    path = _save(tmp_path / f"run{suffix}", time=T, u=U, y=1e3 * Y)
+    record = read(path, force="u", displacement="y", units={"u": "N", "y": "mm"}, at_rest=True)
+    np.testing.assert_allclose(record.time, T, rtol=1e-15)
+    np.testing.assert_allclose(record.channels["force", 1], U, rtol=1e-15)
+    np.testing.assert_allclose(record.channels["displacement", 1], Y, rtol=1e-14)
+    assert (record.name, record.at_rest, record.drive, record.units["displacement"]) == ("run", True, "force", "m")
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".txt", ".npz", ".mat"])
+@pytest.mark.parametrize("units", [{}, {"force": "kip", "displacement": "deg"}, {"displacement": "mV", "force": "V"}])
+def test_a_written_record_is_read_back_the_same(tmp_path, suffix, units):
+    channels = {"force": {2: U}, "displacement": np.stack([Y, U], 1), "acceleration": Y / 3, "base_acceleration": U / 7}
+    record = Record(T / 3 + 5, **channels, units=units, at_rest=True, drive="motion", name="Lauf 7, März").noted("cut")
+    record.write(tmp_path / f"a{suffix}")
+    again = read(tmp_path / f"a{suffix}")
+    np.testing.assert_array_equal(again.time, record.time)
+    assert list(again.channels) == list(record.channels)
+    for key, samples in record.channels.items():
+        np.testing.assert_array_equal(again.channels[key], samples)
+    np.testing.assert_array_equal(again.base_acceleration, record.base_acceleration)
+    assert dict(again.units) == dict(record.units)
+    assert (again.at_rest, again.drive, again.name, again.notes) == (True, "motion", "Lauf 7, März", ("cut",))
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz", ".mat"])
+def test_a_record_without_channels_is_read_back(tmp_path, suffix):
+    Record(T).write(tmp_path / f"a{suffix}")
+    again = read(tmp_path / f"a{suffix}")
+    assert (len(again), dict(again.channels), again.name) == (100, {}, None)
+
+
+def test_what_the_caller_says_overrides_what_the_file_says(tmp_path):
+    Record(T, force=U, at_rest=True, name="old").write(tmp_path / "a.csv")
+    record = read(tmp_path / "a.csv", displacement="force_1", units={"force_1": "V"}, at_rest=False, name="new")
+    assert list(record.channels) == [("displacement", 1)]
+    assert (record.units["displacement"], record.at_rest, record.name) == ("V", False, "new")
+
+
+def test_a_file_is_replaced_only_by_a_complete_one(tmp_path, monkeypatch):
+    path = tmp_path / "a.npz"
+    Record(T, force=U).write(path)
+    before = path.read_bytes()
+
+    def interrupted(stream, **arrays):
+        stream.write(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(np, "savez", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        Record(T, force=Y).write(path)
+    assert path.read_bytes() == before
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.npz"]
+
+
+@pytest.mark.parametrize("call", [lambda path: read(path), lambda path: Record(T).write(path)])
+def test_an_unknown_suffix_is_refused(tmp_path, call):
+    with pytest.raises(ValueError, match=r"`path` must end in one of \.csv .*\.npz \.mat.*; it was 'a\.xlsx'"):
+        call(tmp_path / "a.xlsx")
+
+
+def test_a_missing_file_is_reported_as_such(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        read(tmp_path / "a.csv", force="u")
+
+
+@pytest.mark.parametrize("clock", [{"fs": 50.0}, {"sample_rate": 50.0}, {"dt": 0.02}])
+def test_a_single_number_gives_the_clock(tmp_path, clock):
+    for suffix in (".npz", ".mat"):
+        record = read(_save(tmp_path / f"a{suffix}", u=U, **clock), force="u")
+        np.testing.assert_allclose(record.time, T, atol=1e-12)
+
+
+def test_the_clock_may_be_a_rate_or_any_column(tmp_path):
+    path = _save(tmp_path / "a.csv", T=T, u=U, other=1e3 * T)
+    assert read(path, force="u").dt == pytest.approx(0.02)
+    assert read(path, force="u", rate=200.0).dt == pytest.approx(0.005)
+    assert read(path, force="u", time="other", units={"other": "ms"}).dt == pytest.approx(0.02)
+
+
+def test_several_dofs_come_from_lists_mappings_matrices_and_their_columns(tmp_path):
+    path = _save(tmp_path / "a.npz", t=T, y1=Y, y2=U, both=np.stack([Y, U]), fs=7.0)
+    expected = np.stack([Y, U], 1)
+    for names in (["y1", "y2"], {1: "y1", 2: "y2"}, "both", ["both[0]", "both[1]"]):
+        np.testing.assert_array_equal(read(path, displacement=names).displacement, expected)
+    assert list(read(path, displacement={3: "both[1]"}).channels) == [("displacement", 3)]
+
+
+def test_columns_called_by_kind_need_no_names(tmp_path):
+    path = _save(tmp_path / "a.csv", time=T, force=U, displacement_1=Y, displacement_2=U, note=T)
+    assert list(read(path).channels) == [("force", 1), ("displacement", 1), ("displacement", 2)]
+
+
+def test_fields_of_a_matlab_struct_have_dotted_names(tmp_path):
+    scipy.io.savemat(tmp_path / "a.mat", {"run": {"time": T, "acc": {"tip": Y}, "comment": "shaker"}})
+    record = read(tmp_path / "a.mat", time="run.time", acceleration="run.acc.tip")
+    np.testing.assert_array_equal(record.channels["acceleration", 1], Y)
+
+
+def test_a_matlab_file_of_version_seven_three_names_the_remedy(tmp_path):
+    head = b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(512)
+    (tmp_path / "a.mat").write_bytes(head)
+    with pytest.raises(ValueError, match=r"a\.mat must be a MATLAB file of version 7 or earlier.*save\(.*-v7"):
+        read(tmp_path / "a.mat", force="u")
+
+
+def test_pickled_objects_in_an_archive_are_left_alone(tmp_path):
+    np.savez(tmp_path / "a.npz", t=T, u=U, trap=np.array([{}, []], dtype=object))
+    assert len(read(tmp_path / "a.npz", force="u")) == 100
+    with pytest.raises(ValueError, match="it was 'trap'"):
+        read(tmp_path / "a.npz", force="trap")
+
+
+ROWS = [(f"{t:.3f}", f"{u:.4f}") for t, u in zip(T, U, strict=True)]
+
+
+def _text(delimiter, head="", decimal=".", end=""):
+    return head + "".join(f"{t}{delimiter}{u}{end}\n".replace(".", decimal) for t, u in ROWS)
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        (_text(",", "time,u\n"), "u"),
+        (_text(", ", "time, u\n"), "u"),
+        (_text("\t", "time\tu\n"), "u"),
+        (_text(";", "time;u\n", decimal=","), "u"),
+        (_text("  ", "% a comment\n% time u\n"), "u"),
+        (_text(" ", "# time u\n"), "u"),
+        (_text(",", "Recorder 12,,,\nOperator: K\n\nTime (sec),Load [N]\n"), "Load"),
+        (_text(",", "time,u\ns,N\n"), "u"),
+        (_text(",", "time,u\n[s],[N]\n"), "u"),
+        (_text(",", "time,u,\n", end=","), "u"),
+        (_text(",", "\ufefftime,u\n"), "u"),
+        (_text(",", 'time,"u, front"\n'), "u, front"),
+    ],
+    ids=["comma", "comma and blank", "tab", "semicolon", "percent", "hash", "preamble", "units", "[units]", "trailing",
+         "byte order mark", "quoted"],
+)  # fmt: skip
+def test_layouts_of_text_are_found(tmp_path, text, name):
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    record = read(tmp_path / "a.csv", force=name)
+    np.testing.assert_allclose(record.time, T, atol=1e-12)
+    np.testing.assert_allclose(record.channels["force", 1], U, atol=5.1e-5)
+
+
+@pytest.mark.parametrize("head", ["time,y\ns,mm\n", "time,y [mm]\n", "time,y (mm)\n", "time,y\n[s],[mm]\n"])
+def test_units_that_the_file_states_are_used_unless_the_caller_knows_better(tmp_path, head):
+    (tmp_path / "a.csv").write_text(_text(",", head))
+    samples = read(tmp_path / "a.csv", displacement="y").channels["displacement", 1]
+    np.testing.assert_allclose(samples, 1e-3 * U, atol=1e-7)
+    for units in ({"y": "cm"}, {"displacement": "cm"}):
+        samples = read(tmp_path / "a.csv", displacement="y", units=units).channels["displacement", 1]
+        np.testing.assert_allclose(samples, 1e-2 * U, atol=1e-6)
+
+
+def test_columns_without_a_name_are_numbered(tmp_path):
+    (tmp_path / "a.txt").write_text(_text(" "))
+    record = read(tmp_path / "a.txt", time="column 1", force="column 2")
+    np.testing.assert_allclose(record.channels["force", 1], U, atol=5.1e-5)
+
+
+def test_a_column_of_text_or_of_gaps_is_refused_only_when_it_is_used(tmp_path):
+    lines = [f"{t},{u},{'ok' if i else 'bad'},{'' if i == 7 else u}" for i, (t, u) in enumerate(ROWS)]
+    (tmp_path / "a.csv").write_text("time,u,state,w\n" + "\n".join(lines))
+    assert len(read(tmp_path / "a.csv", force="u")) == 100
+    with pytest.raises(TypeError, match="`force` must hold real numbers"):
+        read(tmp_path / "a.csv", force="state")
+    with pytest.raises(ValueError, match=r"`force dof 1` must be finite; 1 of 100.*is sample 7"):
+        read(tmp_path / "a.csv", force="w")
+
+
+def test_older_encodings_are_read(tmp_path):
+    (tmp_path / "a.csv").write_bytes(_text(",", "time,Kraft für 3°\n").encode("latin-1"))
+    assert len(read(tmp_path / "a.csv", force="Kraft für 3°")) == 100
+
+
+def test_columns_of_one_name_stay_apart(tmp_path):
+    (tmp_path / "a.csv").write_text("time,u,u\n" + "".join(f"{t},{u},1\n" for t, u in ROWS))
+    assert read(tmp_path / "a.csv", force="u (3)").channels["force", 1][0] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("time,u\n0,1\n1,2\n2,3\n3\n", r"a\.csv must have 2 columns in every row of data; line 5 has 1"),
+        ("nothing\nto see\nhere\n", r"a\.csv must hold columns of numbers; its middle line is 'to see'"),
+        ("", r"a\.csv must hold columns of numbers; its middle line is ''"),
+    ],
+)
+def test_text_that_is_no_table_is_refused(tmp_path, text, message):
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(ValueError, match=message):
+        read(tmp_path / "a.csv", force="u")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({}, r"a\.npz must be told which channel is what.*it holds 't', 'force_in', 'm', 'scale'"),
+        (dict(force="force_on"), r"`force` must name a channel .*; it was 'force_on'\. Did you mean 'force_in'\?"),
+        (dict(force="m[2]"), r"`force` must name a column that exists; 'm' in a\.npz has shape \(100, 2\)"),
+        (dict(force="force_in", units={"x": "m"}), "`units` must name channels that are read, .*; it names 'x'"),
+        (dict(force="force_in", units={"force_in": "ell"}), "`units` of force must be a unit of force.*'ell'"),
+        (
+            dict(displacement=["m[0]", "m[1]"], units={"m[0]": "mm"}),
+            r"`units` must be the same for all channels of a kind; those of displacement are .*'m\[1\]': None",
+        ),
+        (dict(force="force_in", time="t", rate=3.0), r"`time` and `rate` cannot both be given; they were 't' and 3\.0"),
+        (dict(force="force_in", rate=-1.0), r"`rate` must be a positive number of samples per second; it was -1\.0"),
+    ],
+)
+def test_a_wrong_request_is_refused_with_what_the_file_holds(tmp_path, arguments, message):
+    path = _save(tmp_path / "a.npz", t=T, force_in=U, m=np.stack([U, Y], 1), scale=3.0)
+    with pytest.raises(ValueError, match=message):
+        read(path, **arguments)
+
+
+def test_a_file_without_a_clock_is_refused(tmp_path):
+    path = _save(tmp_path / "a.npz", u=U, y=Y)
+    with pytest.raises(ValueError, match=r"a\.npz must say when its samples were taken; it holds 'u', 'y'\. Pass"):
+        read(path, force="u")
+
+
+def test_the_remarks_of_a_written_text_file_are_one_line_of_json(tmp_path):
+    Record(T, force=U, units={"force": "kN"}).write(tmp_path / "a.csv")
+    lines = (tmp_path / "a.csv").read_text(encoding="utf-8").splitlines()
+    remarks = json.loads(lines[0].removeprefix("# jfsm record "))
+    assert remarks == {"at_rest": False, "drive": "force", "name": None, "notes": []}
+    assert lines[1:3] == ["time,force_1", "[s],[N]"]
