@@ -15,3 +15,4 @@ from .structures import QuadraticDamping as QuadraticDamping
 from .structures import QuadraticStiffness as QuadraticStiffness
 from .structures import Structure as Structure
 from .structures import causes as causes
+from .surrogates import RKPM as RKPM

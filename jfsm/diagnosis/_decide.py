@@ -6,7 +6,7 @@ evidence is trusted as it stands; where it does not, evidence counts no more tha
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,8 +72,11 @@ def probabilities(trials: Sequence[Trial], periods: float) -> np.ndarray:
     return 0.995 * share / np.sum(share) + 0.005 / len(trials)
 
 
-def decide(given: Trial, refitted: Trial, tried: Sequence[Trial], mapped: Trial | None, periods: float) -> Decision:
-    """Verdict over the model as given, the model refitted, every candidate, and a map that stands for any law."""
+def decide(given: Trial, refitted: Trial, tried: Sequence[Trial], stand_in: Callable[[], Trial | None], periods: float) -> Decision:
+    """Verdict over the model as given, the model refitted, every candidate, and a map that stands for any law.
+
+    `stand_in` makes the map's trial; it is asked only where the winner leaves something.
+    """
     kappa, why = {}, {}
     nothing = max(given.evidence, refitted.evidence)
     passing = []
@@ -89,6 +92,7 @@ def decide(given: Trial, refitted: Trial, tried: Sequence[Trial], mapped: Trial 
     for t in passing:
         if t is not winner:
             why[id(t)] = f"explains it too, but is {winner.evidence - t.evidence:.1f} nats less probable than the best"
+    mapped = None if adequate(winner) else stand_in()
     verdict = _verdict(given, refitted, winner, tried, mapped)
     if verdict == "cause" and chance[id(winner)] < 0.5:
         families = [t for t in passing if t.cause is not None and winner.cause is not None and t.cause.family == winner.cause.family]
@@ -126,7 +130,8 @@ def _verdict(given: Trial, refitted: Trial, winner: Trial, tried: Sequence[Trial
         return "consistent"
     if clean:
         return "parameters" if winner is refitted else "cause" if winner.cause else "consistent"
-    stands_in = mapped is not None and mapped.evidence - winner.evidence > 2 * SIGNIFICANT and explained(mapped, winner) >= GATE
+    # No evidence for a map: it was fitted beforehand, and held-out samples judge it.
+    stands_in = mapped is not None and explained(mapped, winner) >= GATE
     if winner.cause is not None:
         return "unnamed" if stands_in else "cause"
     if stands_in:

@@ -8,19 +8,18 @@ import jax
 import numpy as np
 
 from .._types import require_x64
-from ..identification import Hypothesis, Nuisances, Posterior, maximise, prepare
+from ..identification import Nuisances, Posterior, maximise, prepare
 from ..records import Record
 from ..structures import Cause, Structure
 from ._candidates import Candidate, candidates, chosen_causes, hypothesis
-from ._decide import Decision, decide
+from ._decide import decide
 from ._diagnosis import Diagnosis
 from ._gain import measure_gain
 from ._report import assemble
+from ._residual import residual, stand_in
 from ._trial import Trial, trial
 
 Progress = Callable[[str, int, int], None]
-
-RECONSTRUCTIONS = ("band-limited", "linear", "hold")
 
 
 def diagnose(
@@ -78,9 +77,9 @@ def diagnose(
     steps = _Steps(progress, 4 + len(tried))
 
     steps.next("the model as given")
-    given = _fit(Candidate, "given", model, records, until, refit=False)
+    given = _fit("given", model, records, until, refit=False)
     steps.next("the model refitted")
-    refitted = _fit(Candidate, "refitted", model, records, until, refit=True)
+    refitted = _fit("refitted", model, records, until, refit=True)
     trials = []
     best = min(given.value, refitted.value)
     for candidate in tried:
@@ -88,11 +87,18 @@ def diagnose(
         trials += list(_try(candidate, model, records, until, best))
         best = min(best, *(t.value for t in trials))
     trials = _best_of_each(trials)
-    steps.next("a map that stands for any law")
+    steps.next("the missing force")
+    missing = residual(refitted, model, records[0], until[0])
     periods = sum(n.record.duration for n in records) * records[0].omega / (2 * math.pi)
-    decision = decide(given, refitted, trials, None, periods)
+    decision = decide(given, refitted, trials, lambda: stand_in(missing, refitted, records, until), periods)
+    extended = model if decision.verdict == "consistent" else decision.winner.extended()
     steps.next("the gain on held-out readings")
-    return _conclude(decision, given, refitted, trials, model, records, held, key)
+    gain, runs = None, []
+    if held:
+        first = records[0]
+        noise = _noise_levels(decision.winner, first)
+        gain, runs = measure_gain(model, refitted.extended(), extended, held, noise, first.omega, first.reconstruction, key)
+    return assemble(decision, refitted, trials, model, extended, records, missing, gain, runs)
 
 
 class _Steps:
@@ -133,7 +139,7 @@ def _prepare(records: Sequence[Record], until: Sequence[int], model: Structure) 
     return first
 
 
-def _fit(_, name: str, model: Structure, records, until, *, refit: bool) -> Trial:
+def _fit(name: str, model: Structure, records, until, *, refit: bool) -> Trial:
     posterior = Posterior(hypothesis(model, [model], records, refit=refit), records, until)
     return trial(posterior, maximise(posterior), 0, None, (name,))
 
@@ -157,18 +163,6 @@ def _best_of_each(trials: Sequence[Trial]) -> list[Trial]:
         if name not in best or t.evidence > best[name].evidence:
             best[name] = t
     return list(best.values())
-
-
-def _conclude(decision: Decision, given: Trial, refitted: Trial, trials, model, records, held, key) -> Diagnosis:
-    extended = {"consistent": model}.get(decision.verdict, decision.winner.structure)
-    gain, curves = (None, [])
-    if held:
-        first = records[0]
-        noise = _noise_levels(decision.winner, first)
-        gain, curves = measure_gain(model, refitted.structure, extended, held, noise, first.omega, first.reconstruction, key)
-    return assemble(decision, given, refitted, trials, model, extended, records, gain, curves)
-
-
 
 
 def _noise_levels(winner: Trial, nuisances: Nuisances) -> dict[tuple, float]:

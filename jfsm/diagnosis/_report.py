@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from ..identification import Nuisances
-from ..structures import PARAMETER_CAUSES, Structure
+from ..structures import PARAMETER_CAUSES, AbstractTerm, Structure
 from ._decide import Decision
 from ._diagnosis import CandidateResult, Diagnosis, Estimate, Finding, Rival
 from ._gain import Gain
+from ._residual import Residual, curves
 from ._trial import Trial
 
 _RIVAL = 0.02
@@ -20,7 +21,15 @@ _SHOWN = 2000
 
 
 def assemble(
-    decision: Decision, given: Trial, refitted: Trial, trials: list[Trial], model: Structure, extended: Structure, records: list[Nuisances], gain: Gain | None, curves: list[dict]
+    decision: Decision,
+    refitted: Trial,
+    trials: list[Trial],
+    model: Structure,
+    extended: Structure,
+    records: list[Nuisances],
+    missing: Residual,
+    gain: Gain | None,
+    runs: list[dict],
 ) -> Diagnosis:
     """The diagnosis, with everything that the report needs."""
     units = records[0].record.units
@@ -45,12 +54,18 @@ def assemble(
         "gain": None if gain is None else _gain(gain),
         "notes": list(notes),
         "detectable": {},
-        "curves": {"holdout": _holdout(curves)},
+        "curves": {"holdout": _holdout(runs), **curves(missing, units, _law(decision, extended))},
     }
     return Diagnosis(
         verdict=decision.verdict, findings=findings, candidates=candidates, extended=extended, refitted=refit, gain=gain,
         detectable={}, noise=noise, notes=notes, sentence=sentence, advice=advice, data=data,
     )  # fmt: skip
+
+
+def _law(decision: Decision, extended: Structure) -> AbstractTerm | None:
+    """The named term, if a term was named."""
+    cause = decision.winner.cause
+    return None if decision.verdict != "cause" or cause is None or cause.is_sensor else extended.terms[-1]
 
 
 def _version() -> str:
@@ -151,10 +166,10 @@ def _gain(gain: Gain) -> dict[str, Any]:
     return {"closed": gain.closed, "before": gain.before, "refitted": gain.refitted, "after": gain.after, "floor": gain.floor, "channels": channels}
 
 
-def _holdout(curves: list[dict]) -> dict[str, Any] | None:
-    if not curves:
+def _holdout(runs: list[dict]) -> dict[str, Any] | None:
+    if not runs:
         return None
-    record, before, after = (curves[0][k] for k in ("record", "before", "after"))
+    record, before, after = (runs[0][k] for k in ("record", "before", "after"))
     take = slice(0, _SHOWN)
     channels = {
         f"{c[0]} {c[1]}": {"unit": record.units[c[0]], "measured": _list(y[take]), "before": _list(before[c][take]), "after": _list(after[c][take])}

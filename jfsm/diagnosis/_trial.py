@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..identification import Hypothesis, Maximum, Nuisances, Posterior, Unknown
+from ..identification import Hypothesis, Maximum, Nuisances, Posterior, Unknown, without_small_offsets
 from ..structures import Cause, Structure
 
 _FILTERED, _PREDICTED = 2.0, 3.0
@@ -51,6 +51,10 @@ class Trial:
     def name(self) -> str:
         """Cause id, or what the hypothesis is."""
         return self.cause.id if self.cause else str(self.at[0])
+
+    def extended(self) -> Structure:
+        """The structure without the offsets that are not significant."""
+        return without_small_offsets(self.structure, self.unknowns, self.theta, np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
 
     def interval(self, path: str, width: float = 1.96) -> tuple[float, float, float]:
         """Value, low and high of an unknown; symmetric in its own coordinate."""

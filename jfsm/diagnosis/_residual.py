@@ -1,0 +1,97 @@
+"""The force that the refitted model leaves, as points, as a map, and as a term that stands in for a law."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..dynamics._plant import direction, lower
+from ..estimation import latent_force
+from ..identification import Hypothesis, Nuisances, Posterior
+from ..structures import AbstractTerm, Structure
+from ..surrogates import RKPM, HermiteTable, tabulate
+from ._trial import Trial, predict
+
+_NODES = 2000
+"""Points that a map is made of; more of a trajectory are near duplicates."""
+_NEIGHBOURS = 160
+"""Points that support a map at one state: sixteen per monomial of a cubic, as noisy points need."""
+_GRID = 41
+
+
+@dataclass(frozen=True)
+class Residual:
+    """Missing force of one link against its motion."""
+
+    at: tuple[int, int]
+    displacement: np.ndarray
+    velocity: np.ndarray
+    force: np.ndarray
+    force_map: RKPM | None
+
+
+def residual(trial: Trial, model: Structure, nuisances: Nuisances, until: int) -> Residual:
+    """Missing force on the link that carries most of it, and its map over the first `until` samples."""
+    plant = lower(trial.structure, nuisances.channels)
+    n = nuisances.samples
+    readings, fine = nuisances.readings, nuisances.fine
+    found = latent_force(
+        plant, nuisances.show, nuisances.record.time, np.asarray(fine.force)[:n, 0], np.asarray(fine.base)[:n, 0],
+        np.asarray(readings.values)[:n], np.asarray(readings.use)[:n], readings.variance, nuisances.noise.force_variance,
+        nuisances.omega, nuisances.length,
+    )  # fmt: skip
+    rows = np.array([direction(at, model.dof) for at in model.links])
+    # Forces on degrees of freedom as forces on links: exact for a chain, least squares otherwise.
+    forces = np.linalg.lstsq(rows.T, found.force.T, rcond=None)[0]
+    link = int(np.argmax(np.std(forces, axis=1)))
+    d, w, f = found.displacement @ rows[link], found.velocity @ rows[link], forces[link]
+    count = min(until, n)
+    take = np.unique(np.linspace(0, count - 1, min(count, _NODES)).astype(int))
+    try:
+        force_map = RKPM.fit(np.column_stack([d, w])[take], f[take], order=3, neighbours=min(_NEIGHBOURS, take.size // 2))
+    except (ValueError, RuntimeError):  # one orbit only, or too few points: there is no surface to draw
+        force_map = None
+    return Residual(tuple(model.links[link]), d, w, f, force_map)
+
+
+def stand_in(found: Residual, refitted: Trial, records: list[Nuisances], until: list[int]) -> Trial | None:
+    """The refitted model with the map of what it leaves, judged like any other hypothesis.
+
+    Its values are those of the refit; the map is fixed. Held-out samples are its guard against freedom.
+    """
+    table = table_of(found)
+    if table is None:
+        return None
+    structure = refitted.structure + table.on(found.at)
+    posterior = Posterior(Hypothesis((structure,), (refitted.unknowns,)), records, until)
+    return replace(
+        refitted, cause=None, at=("map", *found.at), structure=structure, evidence=-math.inf, prediction=predict(posterior, refitted.theta)
+    )
+
+
+def table_of(found: Residual) -> HermiteTable | None:
+    """The map frozen for simulation."""
+    return None if found.force_map is None else tabulate(found.force_map)
+
+
+def curves(found: Residual, units, term: AbstractTerm | None) -> dict[str, Any]:
+    """Points, map and law for the report, as plain lists."""
+    take = np.unique(np.linspace(0, found.force.size - 1, min(found.force.size, 1500)).astype(int))
+    points = {"at": list(found.at), "displacement": found.displacement[take].tolist(), "velocity": found.velocity[take].tolist()}
+    points |= {"force": found.force[take].tolist(), "unit": {k: units[k] for k in ("displacement", "velocity", "force")}}
+    x = np.linspace(found.displacement.min(), found.displacement.max(), _GRID)
+    v = np.linspace(found.velocity.min(), found.velocity.max(), _GRID)
+    drawn: dict[str, Any] = {"residual": points, "map": None, "law": None}
+    if found.force_map is not None:
+        states = np.stack(np.meshgrid(x, v, indexing="ij"), -1).reshape(-1, 2)
+        values = np.asarray(found.force_map.evaluate(states)).reshape(_GRID, _GRID)
+        visited = np.asarray(found.force_map.visited(states)).reshape(_GRID, _GRID)
+        drawn["map"] = {"displacement": x.tolist(), "velocity": v.tolist(), "force": values.tolist(), "visited": visited.tolist()}
+    if term is not None:
+        zero = np.zeros(())
+        drawn["law"] = {
+            "displacement": x.tolist(), "force_of_displacement": [float(term.force(d, zero, (), zero)) for d in x],
+            "velocity": v.tolist(), "force_of_velocity": [float(term.force(zero, w, (), zero)) for w in v],
+        }  # fmt: skip
+    return drawn

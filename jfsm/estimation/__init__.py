@@ -1,0 +1,9 @@
+"""What state: the filter of a plant, and the force that a model lacks."""
+
+from ._filter import Innovations as Innovations
+from ._filter import ProcessNoise as ProcessNoise
+from ._filter import Readings as Readings
+from ._filter import Start as Start
+from ._filter import innovations as innovations
+from ._latent import Latent as Latent
+from ._latent import latent_force as latent_force

@@ -1,0 +1,179 @@
+r"""The force that a model lacks, as a hidden state: Kalman filter and Rauch-Tung-Striebel smoother.
+
+    M ẍ + C ẋ + K x + r = g,     ṙ = -r/τ + w,
+
+r is an Ornstein-Uhlenbeck process per degree of freedom, its amplitude and its memory τ chosen by likelihood among a
+few. Whatever the model says of nonlinear terms is inside r, and is taken off afterwards. The force runs straight
+between samples here: this is for pictures, maps and first guesses, not for the likelihood of a hypothesis.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import scipy.linalg
+from jaxtyping import Array, Float
+
+from ..dynamics._plant import Plant, Readout, friction_limits, smooth_force
+
+_MEMORIES = (0.15, 1.0)
+"""τ of the latent force, in radians of the motion."""
+_AMPLITUDES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
+"""Its amplitude, as a share of the elastic force."""
+_WIDE = 10.0
+
+
+@dataclass(frozen=True)
+class Latent:
+    """Smoothed motion and missing force of a record.
+
+    Attributes
+    ----------
+    displacement, velocity, force : (n, dof) arrays
+        `force` stands on the left-hand side, restoring side positive, beside everything the model has.
+    std : (n, dof) array
+        Standard error of `force`.
+    """
+
+    displacement: np.ndarray
+    velocity: np.ndarray
+    force: np.ndarray
+    std: np.ndarray
+
+
+class _Model(eqx.Module):
+    step: Float[Array, "state state"]
+    by_force: Float[Array, "2 state dof"]
+    noise: Float[Array, "state state"]
+    rows: Float[Array, "channels state"]
+    through: Float[Array, "channels dof"]
+    start: Float[Array, "state state"]
+
+
+def latent_force(
+    plant: Plant, show: Readout, time, force, base, values, use, variance, force_variance, omega: float, length: float
+) -> Latent:
+    """Smoothed motion and missing force.
+
+    Parameters
+    ----------
+    plant : Plant
+        With its sensors' gains and offsets.
+    force, base, values, use : (n, dof), (n,), (n, channels), (n, channels) arrays
+        Measured force, acceleration of the base, readings, and which of them count.
+    variance, force_variance : (channels,), (dof,) arrays
+    omega, length : float
+        Angular frequency [rad/s] and size of the motion.
+    """
+    time = np.asarray(time)
+    dt = float(time[1] - time[0])
+    true = (np.asarray(force) - np.asarray(plant.force_offset)) / (1 + np.asarray(plant.force_gain))
+    true = true - np.asarray(base)[:, None] * np.asarray(plant.mass).sum(1)
+    seen = (np.asarray(values) - np.asarray(plant.channel_offset)) / (1 + np.asarray(plant.channel_gain))
+    acceleration = np.array([kind == "acceleration" for kind in show.kinds])
+    seen = seen - np.asarray(base)[:, None] * acceleration
+    models = [
+        _model(plant, show, dt, tau / omega, share * omega**2 * length, np.asarray(force_variance), omega, length)
+        for tau, share in product(_MEMORIES, _AMPLITUDES)
+    ]
+    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *models)
+    data = (jnp.asarray(true), jnp.asarray(seen), jnp.asarray(use), jnp.asarray(variance))
+    likelihoods = np.asarray(_likelihoods(stacked, *data))
+    best = models[int(np.nanargmax(likelihoods))]
+    mean, std = (np.asarray(out) for out in _smooth(best, *data))
+    dof = plant.dof
+    x, v, r = mean[:, :dof], mean[:, dof : 2 * dof], mean[:, 2 * dof :]
+    known = np.asarray(_nonlinear(plant, jnp.asarray(x), jnp.asarray(v), jnp.asarray(time)))
+    return Latent(x, v, r - known, std[:, 2 * dof :])
+
+
+def _model(plant: Plant, show: Readout, dt, tau, amplitude, force_variance, omega, length) -> _Model:
+    dof = plant.dof
+    minv = np.linalg.inv(np.asarray(plant.mass))
+    zero, eye = np.zeros((dof, dof)), np.eye(dof)
+    k, c = np.asarray(plant.stiffness), np.asarray(plant.damping)
+    rate = np.block([[zero, eye, zero], [-minv @ k, -minv @ c, -minv], [zero, zero, -eye / tau]])
+    gain = np.concatenate([zero, minv, zero])
+    n = 3 * dof
+    # A force that runs straight over the step: exponential of the chained system (state, force, slope of the force).
+    chain = np.zeros((n + 2 * dof, n + 2 * dof))
+    chain[:n, :n], chain[:n, n : n + dof], chain[n : n + dof, n + dof :] = rate, gain, eye / dt
+    exponential = scipy.linalg.expm(chain * dt)
+    whole, ramp = exponential[:n, n : n + dof], exponential[:n, n + dof :]
+    mass = np.diag(np.asarray(plant.mass))
+    noise = np.zeros((n, n))
+    noise[dof : 2 * dof, dof : 2 * dof] = minv @ np.diag(force_variance * dt**2) @ minv.T
+    noise[2 * dof :, 2 * dof :] = np.diag((amplitude * mass) ** 2 * -np.expm1(-2 * dt / tau))
+    row = {"displacement": np.hstack([eye, zero, zero]), "velocity": np.hstack([zero, eye, zero]), "acceleration": rate[dof : 2 * dof]}
+    select = np.asarray(show.select)
+    rows = np.array([s @ row[kind] for kind, s in zip(show.kinds, select, strict=True)])
+    through = np.array([s @ minv if kind == "acceleration" else 0 * s for kind, s in zip(show.kinds, select, strict=True)])
+    sizes = np.concatenate([np.full(dof, length), np.full(dof, length * omega), amplitude * mass])
+    start = np.diag((_WIDE * sizes) ** 2)
+    return _Model(*(jnp.asarray(a) for a in (exponential[:n, :n], np.stack([whole - ramp, ramp]), noise, rows, through, start)))
+
+
+def _filter(model: _Model, force, values, use, variance):
+    """Filtered and predicted moments at every sample, and the log-likelihood."""
+
+    def body(carry, inputs):
+        mean, covariance = carry
+        g, after, y, counted = inputs
+        predicted = (mean, covariance)
+        total = jnp.zeros(())
+        for c in range(y.shape[0]):
+            row = model.rows[c]
+            cross = jnp.sum(covariance * row[None, :], 1)
+            spread = jnp.sum(row * cross) + variance[c]
+            error = y[c] - jnp.sum(row * mean) - jnp.sum(model.through[c] * g)
+            weight = counted[c] * cross / spread
+            mean, covariance = mean + weight * error, covariance - weight[:, None] * cross[None, :]
+            total = total - 0.5 * counted[c] * (error**2 / spread + jnp.log(spread))
+        moved = model.step @ mean + model.by_force[0] @ g + model.by_force[1] @ after
+        return (moved, model.step @ covariance @ model.step.T + model.noise), (*predicted, mean, covariance, total)
+
+    following = jnp.concatenate([force[1:], force[-1:]])
+    start = (jnp.zeros(model.start.shape[0]), model.start)
+    return jax.lax.scan(body, start, (force, following, values, use))[1]
+
+
+@jax.jit
+def _likelihoods(models: _Model, force, values, use, variance):
+    return jax.vmap(lambda m: jnp.sum(_filter(m, force, values, use, variance)[-1]))(models)
+
+
+@jax.jit
+def _smooth(model: _Model, force, values, use, variance):
+    ahead, spread_ahead, mean, covariance, _ = _filter(model, force, values, use, variance)
+
+    def body(carry, inputs):
+        later, spread_later = carry
+        ahead, spread_ahead, mean, covariance = inputs
+        weight = jnp.linalg.solve(spread_ahead, model.step @ covariance).T
+        mean = mean + weight @ (later - ahead)
+        covariance = covariance + weight @ (spread_later - spread_ahead) @ weight.T
+        return (mean, covariance), (mean, jnp.diag(covariance))
+
+    inputs = (ahead[1:], spread_ahead[1:], mean[:-1], covariance[:-1])
+    _, (means, variances) = jax.lax.scan(body, (mean[-1], covariance[-1]), inputs, reverse=True)
+    means = jnp.concatenate([means, mean[-1:]])
+    variances = jnp.concatenate([variances, jnp.diag(covariance[-1])[None]])
+    return means, jnp.sqrt(jnp.maximum(variances, 0.0))
+
+
+@eqx.filter_jit
+def _nonlinear(plant: Plant, x, v, time):
+    """What the model says of nonlinear terms and friction along the motion."""
+
+    def one(x, v, t):
+        force = smooth_force(plant, x, v, t) - plant.stiffness @ x - plant.damping @ v
+        if len(plant.friction):
+            low, high = friction_limits(plant, x, v, t)
+            speed = plant.friction.direction @ v
+            force = force + jnp.where(speed > 0, high, jnp.where(speed < 0, low, 0.0)) @ plant.friction.direction
+        return force
+
+    return jax.vmap(one)(x, v, time)

@@ -1,0 +1,100 @@
+"""The force that the simulation lacks: along each axis of the state with the named law, and as a map over the plane."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import FigureBase
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
+
+from jfsm.reporting._canvas import AFTER, FLOOR, INK, PAPER, key_above, label
+from jfsm.reporting._curves import Curve, curve, peak
+from jfsm.reporting._quantities import Scale, quantity, scale_for
+
+AXES = {"displacement": "velocity", "velocity": "displacement"}  # an axis, and the other one
+NEAR_ZERO = 0.2  # of the other axis' peak: points that the law's line, drawn for 0 there, should meet
+MOST_POINTS = 4000
+LEVELS = 15
+ZERO_LINE = "#3a444e"  # crosses the pale middle of the colours, in a dark theme too
+
+
+def draw_residual(figure: FigureBase, residual: Mapping[str, Any], law: Mapping[str, Any] | None) -> None:
+    """Points of the missing force against displacement and against velocity, the named law's line over them."""
+    force, units = curve(residual["force"]), residual.get("unit") or {}
+    force_scale = scale_for(peak(force), units.get("force"))
+    for place, (axis, other) in enumerate(AXES.items(), start=1):
+        axes = figure.add_subplot(1, 2, place)
+        scale = scale_for(peak(curve(residual[axis])), units.get(axis))
+        points = curve(residual[axis]) / scale.factor, force / force_scale.factor
+        _draw_points(axes, *points, curve(residual[other]), other)
+        if law and law.get(f"force_of_{axis}"):
+            line = curve(law[axis]) / scale.factor, curve(law[f"force_of_{axis}"]) / force_scale.factor
+            axes.plot(*line, color=AFTER, linewidth=2.0, label="named law")
+        label(axes, f"{axis} [{scale.unit}]", f"missing force [{force_scale.unit}]")
+        key_above(axes, 3)
+
+
+def _draw_points(axes: Axes, along: Curve, force: Curve, across: Curve, other: str) -> None:
+    """Where the other axis is near 0 the points are strong: these are the ones to compare with the line."""
+    step = max(1, -(-force.size // MOST_POINTS))
+    near = np.abs(across) <= NEAR_ZERO * peak(across)
+    # One path of dots, strokes hardly long with round ends: with a marker each, a page would be ten times as large.
+    half = np.array([peak(along) / 2000.0, 0.0])
+    for chosen, colour, text in ((~near, FLOOR, "all"), (near, INK, f"{other} near 0")):
+        points = np.column_stack([along[chosen], force[chosen]])[::step]
+        points = points[np.isfinite(points).all(axis=1)]
+        ends = np.stack([points - half, points + half], axis=1).reshape(-1, 2)
+        strokes = Path(ends, np.tile([Path.MOVETO, Path.LINETO], len(points)))
+        strokes.should_simplify = False
+        axes.add_patch(PathPatch(strokes, fill=False, edgecolor=colour, linewidth=2.0, capstyle="round", alpha=0.6))
+        axes.plot([], [], ".", color=colour, alpha=0.6, label=text)
+    axes.autoscale_view()
+
+
+def describe_residual(residual: Mapping[str, Any], law: Mapping[str, Any] | None) -> str:
+    """The picture in words."""
+    units = residual.get("unit") or {}
+    reach = [f"{axis} up to {quantity(peak(curve(residual[axis])), units.get(axis))}" for axis in AXES]
+    force = quantity(peak(curve(residual["force"])), units.get("force"))
+    line = " The named law is drawn through the points." if law else ""
+    return f"Missing force, up to {force}, against {reach[0]} and against {reach[1]}.{line}"
+
+
+def draw_map(figure: FigureBase, force_map: Mapping[str, Any], units: Mapping[str, str]) -> None:
+    """Filled contours of the missing force over displacement and velocity; pale where the record never was."""
+    x, v, force = (curve(force_map[part]) for part in ("displacement", "velocity", "force"))
+    scales = [
+        _scale(values, units.get(kind)) for values, kind in ((x, "displacement"), (v, "velocity"), (force, "force"))
+    ]
+    x, v, force = (values / scale.factor for values, scale in zip((x, v, force), scales, strict=True))
+    visited = np.array(force_map["visited"], dtype=bool) if force_map.get("visited") else np.ones(force.shape, bool)
+    # The colours serve the visited region: a map extrapolates to forces that would drown it.
+    limit = peak(force[visited]) or peak(force) or 1.0
+    levels = np.linspace(-limit, limit, LEVELS)
+    axes = figure.add_subplot()
+    shown = np.clip(force, -limit, limit).T
+    filled = axes.contourf(x, v, shown, levels=levels, cmap="RdBu_r")
+    axes.contour(x, v, shown, levels=[0.0], colors=ZERO_LINE, linewidths=0.9)
+    if visited.any() and not visited.all():
+        axes.contourf(x, v, visited.T.astype(float), levels=[-1.0, 0.5], colors=PAPER, alpha=0.7)
+        axes.contour(x, v, visited.T.astype(float), levels=[0.5], colors=INK, linewidths=0.8, linestyles="dashed")
+    bar = figure.colorbar(filled, ax=axes, pad=0.02, ticks=levels[:: (LEVELS - 1) // 2])
+    bar.set_label(f"missing force [{scales[2].unit}]")
+    bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
+    axes.grid(False)
+    label(axes, f"displacement [{scales[0].unit}]", f"velocity [{scales[1].unit}]")
+
+
+def describe_map(force_map: Mapping[str, Any], units: Mapping[str, str]) -> str:
+    """The picture in words."""
+    visited = force_map.get("visited")
+    share = f"; the record visited {100 * np.mean(visited):.0f} % of the plane shown" if visited else ""
+    force = curve(force_map["force"])
+    low, high = (quantity(float(bound), units.get("force")) for bound in (np.nanmin(force), np.nanmax(force)))
+    return f"Map of the missing force over displacement and velocity, from {low} to {high}{share}."
+
+
+def _scale(values: Curve, unit: str | None) -> Scale:
+    return scale_for(peak(values), unit)

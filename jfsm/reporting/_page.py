@@ -1,0 +1,136 @@
+"""The page of a diagnosis: one HTML file that needs nothing beside it."""
+
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from jinja2 import Environment, StrictUndefined, Template
+from markupsafe import Markup
+
+from jfsm.reporting._canvas import svg
+from jfsm.reporting._pictures import pictures
+from jfsm.reporting._quantities import number
+from jfsm.reporting._summary import key_answers
+from jfsm.reporting._tables import (
+    Table,
+    candidates_table,
+    channels_table,
+    detectable_table,
+    findings_table,
+    gain_table,
+    refitted_table,
+    rivals_table,
+)
+from jfsm.reporting._wording import checked_verdict
+
+FIRST_CANDIDATES = 10
+
+
+def render_page(d: Mapping[str, Any]) -> str:
+    """A diagnosis as one self-contained HTML page.
+
+    The verdict, the cause, its certainty and the gain come first, then the evidence. Pictures are inside the page as
+    SVG with their content in words; light, dark and print have their own colours; nothing is loaded from elsewhere, and
+    every text of the diagnosis is escaped. The same dictionary gives the same characters.
+
+    Parameters
+    ----------
+    d : mapping
+        What ``Diagnosis.to_json`` writes; parts may be None or missing, except the verdict.
+
+    Returns
+    -------
+    str
+        An HTML document.
+
+    Raises
+    ------
+    ValueError
+        If `d` is not the dictionary of a diagnosis.
+    """
+    findings, candidates = d.get("findings") or (), d.get("candidates") or ()
+    record = d.get("record") or {}
+    verdict = checked_verdict(d)
+    headline, _, remark = (d.get("sentence") or verdict.meaning).partition(". ")
+    return _template().render(
+        version=d.get("jfsm"),
+        verdict=verdict,
+        headline=headline,
+        remark=remark,
+        advice=d.get("advice"),
+        title=record.get("name") or "a measured record",
+        record_line=_record_line(record),
+        answers=key_answers(d),
+        pictures={
+            picture.name: {
+                "title": picture.title,
+                "caption": picture.caption,
+                "alt": picture.alt,
+                "svg": _inline(picture),
+            }
+            for picture in pictures(d)
+        },
+        statements=[finding["sentence"] for finding in findings if finding.get("sentence")],
+        findings=findings_table(findings),
+        rivals=rivals_table(findings),
+        gain=gain_table((d.get("gain") or {}).get("channels") or {}),
+        first_candidates=candidates_table(candidates[:FIRST_CANDIDATES], findings),
+        more_candidates=candidates_table(candidates[FIRST_CANDIDATES:], findings),
+        refitted=refitted_table(d.get("refitted") or {}),
+        channels=channels_table(record.get("channels") or ()),
+        detectable=detectable_table(d.get("detectable") or {}),
+        model=d.get("model") or (),
+        extended=_additions(d),
+        notes=d.get("notes") or (),
+        timing=_timing(d.get("timing") or {}),
+    )
+
+
+def _inline(picture: Any) -> Markup:
+    # Safe to take as it is: matplotlib escapes the texts that it writes into an SVG.
+    return Markup(svg(picture.figure, picture.name))
+
+
+def _record_line(record: Mapping[str, Any]) -> str:
+    samples, rate, duration = (record.get(key) for key in ("samples", "sample_rate", "duration"))
+    parts = (
+        f"{samples} samples" if samples is not None else "",
+        f"{number(rate, 4)} Hz" if rate is not None else "",
+        f"{number(duration, 4)} s" if duration is not None else "",
+    )
+    return " · ".join(filter(None, parts))
+
+
+def _additions(d: Mapping[str, Any]) -> list[tuple[str, bool]]:
+    """Lines of the extended structure, and whether the model as given has them in the same words."""
+    given = set(d.get("model") or ())
+    return [(line, line in given) for line in d.get("extended") or ()]
+
+
+def _timing(timing: Mapping[str, Any]) -> str:
+    seconds, programs = timing.get("seconds"), timing.get("programs")
+    parts = (
+        f"{number(seconds)} s of computing" if seconds is not None else "",
+        f"{programs} compiled programs" if programs is not None else "",
+    )
+    return ", ".join(filter(None, parts))
+
+
+@cache
+def _template() -> Template:
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.globals["is_words"] = _is_words
+    environment.filters["unbroken"] = _unbroken
+    source = files("jfsm.reporting").joinpath("page.html.j2").read_text(encoding="utf-8")
+    return environment.from_string(source)
+
+
+def _unbroken(detail: str) -> str:
+    """ "displacement 1: 6.83 → 0.298 mm" with its figures on one line."""
+    head, colon, figures = detail.rpartition(": ")
+    return head + colon + figures.replace(" ", "\N{NO-BREAK SPACE}") if colon else detail
+
+
+def _is_words(table: Table, column: int) -> bool:
+    return column in table.text_columns

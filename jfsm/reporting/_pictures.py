@@ -1,0 +1,150 @@
+"""The pictures of a diagnosis, each made only if the diagnosis holds what it shows."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from matplotlib.figure import Figure, FigureBase
+
+from jfsm.reporting._canvas import house_style
+from jfsm.reporting._force_pictures import describe_map, describe_residual, draw_map, draw_residual
+from jfsm.reporting._record_picture import describe_record, draw_record, drawn_channels
+from jfsm.reporting._score_pictures import describe_gain, describe_ranking, draw_gain, draw_ranking, ranked_size
+from jfsm.reporting._wording import checked_verdict
+
+WIDTH = 10.0  # inches
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """A picture to be drawn: what it is called and says, its height in inches, and how it is drawn."""
+
+    name: str
+    title: str
+    caption: str
+    alt: str
+    height: float
+    draw: Callable[[FigureBase], None]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A drawn picture.
+
+    Attributes
+    ----------
+    name : str
+        "record", "residual", "map", "gain" or "ranking".
+    title, caption : str
+    alt : str
+        The picture in words, numbers included.
+    figure : matplotlib.figure.Figure
+        Not registered with pyplot: ``figure.savefig(path)`` writes it.
+    """
+
+    name: str
+    title: str
+    caption: str
+    alt: str
+    figure: Figure
+
+
+def pictures(d: Mapping[str, Any]) -> tuple[Picture, ...]:
+    """Every picture that a diagnosis has data for, in the order of the page.
+
+    Parameters
+    ----------
+    d : mapping
+        What ``Diagnosis.to_json`` writes; parts may be None or missing, except the verdict.
+
+    Raises
+    ------
+    ValueError
+        If `d` is not the dictionary of a diagnosis.
+    """
+    made = []
+    for sketch in _sketches(d):
+        with house_style():
+            figure = Figure(figsize=(WIDTH, sketch.height), layout="constrained")
+            sketch.draw(figure)
+        made.append(Picture(sketch.name, sketch.title, sketch.caption, sketch.alt, figure))
+    return tuple(made)
+
+
+def plot_diagnosis(d: Mapping[str, Any]) -> Figure:
+    """All pictures of a diagnosis on one sheet; an empty sheet that says so if there is nothing to draw.
+
+    Raises
+    ------
+    ValueError
+        If `d` is not the dictionary of a diagnosis.
+    """
+    sketches = list(_sketches(d))
+    with house_style():
+        if not sketches:
+            figure = Figure(figsize=(WIDTH, 1.5), facecolor="white")
+            figure.text(0.5, 0.5, "This diagnosis holds no curves to draw.", ha="center", va="center")
+            return figure
+        heights = [sketch.height for sketch in sketches]
+        figure = Figure(figsize=(WIDTH, sum(heights)), layout="constrained", facecolor="white")
+        sheets = figure.subfigures(len(sketches), 1, height_ratios=heights, squeeze=False)[:, 0]
+        for sheet, sketch in zip(sheets, sketches, strict=True):
+            sheet.suptitle(sketch.title, x=0.01, ha="left", fontweight="bold")
+            sketch.draw(sheet)
+    return figure
+
+
+def _sketches(d: Mapping[str, Any]) -> Iterator[Sketch]:
+    checked_verdict(d)
+    curves = d.get("curves") or {}
+    if (holdout := curves.get("holdout")) and holdout.get("channels"):
+        shown, measured = len(drawn_channels(holdout)), len(holdout["channels"])
+        left_out = f" {shown} of {measured} channels are shown." if shown < measured else ""
+        yield Sketch(
+            "record",
+            "The held-out record",
+            "Free runs over data that took no part in the fit; below each, its error." + left_out,
+            describe_record(holdout),
+            0.4 + 3.6 * shown,
+            lambda figure: draw_record(figure, holdout),
+        )
+    residual, law = curves.get("residual"), curves.get("law")
+    if residual and residual.get("force"):
+        yield Sketch(
+            "residual",
+            "The force that the simulation lacks",
+            "Estimated from the record without assuming a law. The stronger points, where the other coordinate is near "
+            "zero, are those to compare with a law's line.",
+            describe_residual(residual, law),
+            3.9,
+            lambda figure: draw_residual(figure, residual, law),
+        )
+    if force_map := curves.get("map"):
+        units = (residual or {}).get("unit") or {}
+        yield Sketch(
+            "map",
+            "Map of the missing force",
+            "Full colours inside the dashed line, where the record has been; veiled colours are extrapolated. "
+            "The solid line is zero force.",
+            describe_map(force_map, units),
+            4.4,
+            lambda figure: draw_map(figure, force_map, units),
+        )
+    if channels := (d.get("gain") or {}).get("channels"):
+        yield Sketch(
+            "gain",
+            "The gain, channel by channel",
+            "The floor is what noise in the drive and an uncertain start would leave of a perfect model.",
+            describe_gain(channels),
+            0.9 + 0.95 * len(channels),
+            lambda figure: draw_gain(figure, channels),
+        )
+    if candidates := d.get("candidates"):
+        yield Sketch(
+            "ranking",
+            "The candidates side by side",
+            "A cause has to explain the error on the left and to lead by evidence on the right.",
+            describe_ranking(candidates),
+            1.0 + 0.3 * ranked_size(candidates),
+            lambda figure: draw_ranking(figure, candidates, d.get("findings") or ()),
+        )

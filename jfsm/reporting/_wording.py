@@ -1,0 +1,80 @@
+"""Ids, places and verdicts in words."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+
+class Verdict(NamedTuple):
+    """A verdict as a reader meets it; `tone` is the class of its colours."""
+
+    label: str
+    tone: str
+    meaning: str
+
+
+VERDICTS: Mapping[str, Verdict] = {
+    "consistent": Verdict(
+        "Consistent", "good", "The simulation explains the record down to its noise; nothing has to be added."
+    ),
+    "parameters": Verdict("Parameters", "change", "The form of the simulation is right; some of its values are off."),
+    "cause": Verdict("Cause found", "change", "The simulation lacks an effect, which is named here."),
+    "unnamed": Verdict(
+        "Unnamed effect", "open", "A real effect is missing that no known cause explains; a map stands in for it."
+    ),
+    "undecided": Verdict("Undecided", "open", "This record cannot tell what is wrong."),
+}
+
+# Names that are not their ids with spaces: people, and the customary spelling.
+PROPER = {
+    "coulomb": "Coulomb friction",
+    "coulomb_asymmetric": "asymmetric Coulomb friction",
+    "smooth_coulomb": "smooth Coulomb friction",
+    "stribeck": "Stribeck friction",
+    "lugre": "LuGre friction",
+    "bouc_wen": "Bouc–Wen hysteresis",
+    "jenkins": "Jenkins slider",
+    "maxwell": "Maxwell element",
+    "van_der_pol": "van der Pol damping",
+    "accel_bias": "accelerometer bias",
+    "accel_gain": "accelerometer gain",
+}
+
+
+def checked_verdict(d: Mapping[str, Any]) -> Verdict:
+    """The verdict of a diagnosis.
+
+    Raises
+    ------
+    ValueError
+        If `d` is not the dictionary of a diagnosis.
+    """
+    found = d.get("verdict")
+    if not isinstance(found, str) or found not in VERDICTS:
+        raise ValueError(
+            f"`d` must be the dictionary that `Diagnosis.to_json` writes, with 'verdict' one of {', '.join(VERDICTS)}; "
+            f"its 'verdict' was {found!r}. Load the file with `json.load` and pass it whole."
+        )
+    return VERDICTS[found]
+
+
+def cause_name(cause: str) -> str:
+    """A cause's id in words: "cubic hardening"; ids outside the catalogue lose their underscores."""
+    return PROPER.get(cause, cause.replace("_", " "))
+
+
+def place_name(at: Sequence[Any] | None) -> str:
+    """Where: "link ground–1" for (0, 1), "mass 1" for (1,), "force channel 1" for ("force", 1)."""
+    match list(at or ()):
+        case []:
+            return ""
+        case [str(kind), *rest]:
+            return " ".join([kind.replace("_", " "), "channel", *map(str, rest)])
+        case [single]:
+            return f"mass {single}"
+        case ends:
+            return "link " + "–".join("ground" if end == 0 else str(end) for end in ends)
+
+
+def capitalised(text: str) -> str:
+    """First letter large, the others as they are: "van der Pol" has its own."""
+    return text[:1].upper() + text[1:]

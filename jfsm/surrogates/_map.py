@@ -1,0 +1,75 @@
+"""What every force state map offers, whatever it was learned by."""
+
+import abc
+from collections.abc import Sequence
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Array, ArrayLike, Bool, Float
+from numpy.typing import NDArray
+
+from ..structures import MapTerm
+
+
+class AbstractForceStateMap(eqx.Module):
+    """A model of the restoring force over the states that were visited.
+
+    Calls on one state are traceable under `jax.jit`, `jax.vmap` and `jax.grad`. Results have no trailing axis where the
+    map was learned from force of shape (n,), and the axis `outputs` where it was (n, outputs). The unit of the force is
+    that of the readings; a derivative is per unit of the columns.
+    """
+
+    @property
+    @abc.abstractmethod
+    def dim(self) -> int:
+        """Number of columns of a state."""
+
+    @property
+    @abc.abstractmethod
+    def box(self) -> Float[Array, "2 dim"]:
+        """Lowest and highest visited value of each column."""
+
+    @abc.abstractmethod
+    def __call__(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
+        """Restoring force at one state."""
+
+    @abc.abstractmethod
+    def gradient(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs dim"]:
+        """First derivatives of the restoring force at one state."""
+
+    @abc.abstractmethod
+    def derivative(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
+        """Mixed derivative at one state; ``orders=(3, 0)`` is the third one in the first column."""
+
+    @abc.abstractmethod
+    def std(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
+        """Standard error of the restoring force at one state, in its unit."""
+
+    @abc.abstractmethod
+    def evaluate_derivatives(
+        self, states: Float[ArrayLike, "q dim"], orders: Sequence[tuple[int, ...]]
+    ) -> Float[Array, "q derivatives *outputs"]:
+        """Several derivatives at many states at once; orders of zero mean the force itself."""
+
+    @abc.abstractmethod
+    def visited(self, states: Float[ArrayLike, "q dim"]) -> Bool[NDArray[np.bool_], " q"]:
+        """Whether each state lies where readings were taken; elsewhere the map extrapolates."""
+
+    def evaluate(self, states: Float[ArrayLike, "q dim"]) -> Float[Array, "q *outputs"]:
+        """Restoring force at many states: the fast path, which may search neighbours on the host."""
+        return self.evaluate_derivatives(states, ((0,) * self.dim,))[:, 0]
+
+    def on(self, at: tuple[int, int] = (0, 1)) -> MapTerm:
+        """This map as a term of a structure, on the link `at`.
+
+        Raises
+        ------
+        ValueError
+            If a state has other columns than one displacement and one velocity.
+        """
+        if self.dim != 2:
+            raise ValueError(
+                f"`on` needs a map of one displacement and one velocity; this one has {self.dim} columns. "
+                "Fit a map of the link's own motion."
+            )
+        return MapTerm(self, at=at)

@@ -1,0 +1,51 @@
+"""Monomials of several coordinates up to a total order, and their derivatives at the origin."""
+
+import functools
+import itertools
+import math
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+MultiIndex = tuple[int, ...]
+
+
+def basis_size(dim: int, order: int) -> int:
+    """Number of monomials of `dim` coordinates up to `order`; the paper's n*, eq. 72."""
+    return math.comb(dim + order, dim)
+
+
+@functools.cache
+def multi_indices(dim: int, order: int) -> tuple[MultiIndex, ...]:
+    """Exponents of all monomials up to `order`, by rising total order: 1, x, v, x², xv, v², …"""
+    every = itertools.product(range(order + 1), repeat=dim)
+    within = (exponents for exponents in every if sum(exponents) <= order)
+    return tuple(sorted(within, key=lambda exponents: (sum(exponents), *(-e for e in exponents))))
+
+
+def monomial_columns(coordinates: Sequence[Float[Array, "*shape"]], order: int) -> list[Float[Array, "*shape"]]:
+    """Every monomial as an array of its own; each is one product of an earlier one, so no power of zero is formed."""
+    columns: dict[MultiIndex, Float[Array, "*shape"]] = {}
+    for exponents in multi_indices(len(coordinates), order):
+        if not any(exponents):
+            columns[exponents] = jnp.ones_like(coordinates[0])
+            continue
+        axis = next(i for i, e in enumerate(exponents) if e)
+        parent = exponents[:axis] + (exponents[axis] - 1,) + exponents[axis + 1 :]
+        columns[exponents] = coordinates[axis] if not any(parent) else columns[parent] * coordinates[axis]
+    return list(columns.values())
+
+
+def monomials(z: Float[Array, "*points dim"], order: int) -> Float[Array, "*points basis"]:
+    """H(z): all monomials up to `order` at points given in the last axis, in the order of `multi_indices`."""
+    return jnp.stack(monomial_columns([z[..., axis] for axis in range(z.shape[-1])], order), axis=-1)
+
+
+def derivative_target(orders: MultiIndex, order: int) -> np.ndarray:
+    """(-1)^|β| H^β(0), the right-hand side of eqs. 23 and 39 for the derivative β = `orders`; shape (basis,)."""
+    target = np.zeros(basis_size(len(orders), order))
+    position = multi_indices(len(orders), order).index(orders)
+    target[position] = (-1.0) ** sum(orders) * math.prod(math.factorial(e) for e in orders)
+    return target

@@ -1,0 +1,85 @@
+"""Force, derivatives and standard error at one state, from the nodes around it."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .basis import MultiIndex, basis_size
+from .nodes import Nodes
+from .shape_functions import LocalBasis, local_basis
+from .support import choose_dilation, gathered_nodes
+from .windows import AbstractWindow
+
+SINGULAR = 1e-12
+"""Pivot ratio of √W H below which no answer is given: its derivatives would have no correct digit."""
+
+
+class Rule(eqx.Module):
+    """How the nodes around a state are weighed."""
+
+    window: AbstractWindow
+    order: int = eqx.field(static=True)
+    neighbours: int = eqx.field(static=True)
+
+
+class Neighbourhood(NamedTuple):
+    """The nodes nearest to one state, nearest first."""
+
+    states: Float[Array, "near dim"]
+    force: Float[Array, "near *outputs"]
+    multiplicity: Float[Array, " near"]
+
+
+def nearest_nodes(nodes: Nodes, rule: Rule, state: Float[Array, " dim"]) -> Neighbourhood:
+    """Neighbours of one state by brute force over all nodes: traceable, O(nodes)."""
+    offsets = jax.lax.stop_gradient((state[None, :] - nodes.states) / nodes.scale[None, :])
+    near = gathered_nodes(rule.neighbours, len(nodes))
+    _, chosen = jax.lax.top_k(-jnp.sum(offsets**2, axis=1), near)
+    return Neighbourhood(nodes.states[chosen], nodes.force[chosen], nodes.multiplicity[chosen])
+
+
+def basis_at(near: Neighbourhood, scale: Float[Array, " dim"], rule: Rule, state: Float[Array, " dim"]) -> LocalBasis:
+    """Local basis with the support that the neighbourhood calls for."""
+    a = choose_dilation(
+        (state[None, :] - near.states) / scale[None, :],
+        near.multiplicity,
+        neighbours=rule.neighbours,
+        order=rule.order,
+        window=rule.window,
+    )
+    return local_basis(
+        state, near.states, a * scale, order=rule.order, window=rule.window, multiplicity=near.multiplicity
+    )
+
+
+def derivatives_at(
+    local: LocalBasis, near: Neighbourhood, orders: tuple[MultiIndex, ...]
+) -> Float[Array, "derivatives *outputs"]:
+    """Σ θ_i^β u_i, eqs. 11 and 46, for several derivatives β of one local basis."""
+    return jnp.stack([jnp.tensordot(local.shape_functions(beta), near.force, axes=1) for beta in orders])
+
+
+def standard_error_at(local: LocalBasis, near: Neighbourhood, state: Float[Array, " dim"]) -> Float[Array, "*outputs"]:
+    """Standard error of the force; `RKPM.std` states the formula."""
+    psi = local.shape_functions((0,) * state.shape[0])
+    force = near.force.reshape(near.force.shape[0], -1)
+    weighted = local.root_weight[:, None] * force
+    residual = weighted - local.q @ (local.q.T @ weighted)  # √(φc)·e
+    freedom = jnp.sum(local.root_weight**2 / near.multiplicity * (1.0 - local.leverage))
+    variance = jnp.sum(residual**2, axis=0) / freedom
+    error = jnp.sqrt(variance * jnp.sum(psi**2 / near.multiplicity))
+    return error.reshape(near.force.shape[1:])
+
+
+def degenerate_message(nodes: Nodes, rule: Rule) -> str:
+    """Why no local fit is possible around a state."""
+    size = basis_size(nodes.dim, rule.order)
+    near = gathered_nodes(rule.neighbours, len(nodes))
+    return (
+        f"The nodes around the state are in degenerate position: the nearest {near} of {len(nodes)} determine fewer "
+        f"than the {size} monomials of order {rule.order} (the moment matrix has rank below {size}). "
+        "Enlarge `neighbours`, lower `order`, or thin out readings that repeat one line or curve."
+    )

@@ -1,0 +1,135 @@
+"""Many states: neighbours from a tree on the host, Cholesky where it is safe, QR where it is not."""
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Array, Float
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from .._blocks import padded_blocks
+from .basis import MultiIndex, basis_size, derivative_target
+from .estimates import SINGULAR, Neighbourhood, Rule, basis_at, degenerate_message, derivatives_at
+from .moments import moment_estimates
+from .nodes import Nodes
+from .support import gathered_nodes
+
+TRUSTED_PIVOT_RATIO = 1e-4
+"""Pivot ratio above which Cholesky serves: M has a condition below 1e8, the force eight correct digits, usually 12."""
+
+LARGEST_WORK = 2**21
+"""Numbers in flight at once, states × neighbours × monomials: 16 MiB, so that a block stays near the cache."""
+
+
+def evaluate_many(
+    nodes: Nodes, rule: Rule, states: NDArray[np.float64], orders: tuple[MultiIndex, ...]
+) -> Float[Array, "q derivatives *outputs"]:
+    """Derivatives of the map at many states; one search and one factor serve all of them.
+
+    Raises
+    ------
+    RuntimeError
+        If the nodes around some state are in degenerate position.
+    """
+    tree = KDTree(np.asarray(nodes.states) / np.asarray(nodes.scale))
+    estimates, ratio = _by_moments(tree, nodes, rule, states, orders)
+    doubtful = np.flatnonzero(ratio < TRUSTED_PIVOT_RATIO)
+    if doubtful.size:
+        exact, conditioning = _by_factorisation(tree, nodes, rule, states[doubtful], orders)
+        failed = doubtful[conditioning < SINGULAR]
+        if failed.size:
+            first = np.array2string(states[failed[0]], precision=4)
+            raise RuntimeError(
+                f"{degenerate_message(nodes, rule)} So at {failed.size} of {len(states)} states, the first {first}."
+            )
+        estimates = estimates.at[doubtful].set(exact)
+    return estimates.reshape(len(states), len(orders), *nodes.force.shape[1:])
+
+
+def _by_moments(
+    tree: KDTree, nodes: Nodes, rule: Rule, states: NDArray[np.float64], orders: tuple[MultiIndex, ...]
+) -> tuple[Float[Array, "q derivatives outputs"], NDArray[np.float64]]:
+    """Fast estimates, each with the pivot ratio of its moment matrix."""
+    scale, multiplicity = np.asarray(nodes.scale), np.asarray(nodes.multiplicity)
+    force = nodes.force.reshape(len(nodes), -1)
+    exponents = jnp.asarray(orders, dtype=float)
+    targets = jnp.asarray(np.stack([derivative_target(beta, rule.order) for beta in orders]))
+    estimates, ratios = [np.zeros((0, len(orders), force.shape[1]))], [np.zeros(0)]
+    for block, length in padded_blocks(states, _block_length(nodes, rule, rule.neighbours)):
+        distance, index = _nearest(tree, block / scale, min(rule.neighbours + 1, len(nodes)))
+        index = index[:, : rule.neighbours]
+        block_estimates, ratio = moment_estimates(
+            jnp.asarray((block / scale)[:, None, :] - tree.data[index]),
+            jnp.asarray(multiplicity[index]),
+            _take(force, index),
+            jnp.asarray(distance),
+            nodes.scale,
+            exponents,
+            targets,
+            rule,
+        )
+        estimates.append(_first(block_estimates, length))
+        ratios.append(np.asarray(ratio)[:length])
+    return _joined(estimates), np.concatenate(ratios)
+
+
+def _by_factorisation(
+    tree: KDTree, nodes: Nodes, rule: Rule, states: NDArray[np.float64], orders: tuple[MultiIndex, ...]
+) -> tuple[Float[Array, "q derivatives outputs"], NDArray[np.float64]]:
+    """Exact estimates with supports that grow, each with the conditioning of its basis."""
+    node_states, multiplicity = np.asarray(nodes.states), np.asarray(nodes.multiplicity)
+    scale, near = np.asarray(nodes.scale), gathered_nodes(rule.neighbours, len(nodes))
+    force = nodes.force.reshape(len(nodes), -1)
+    estimates, conditionings = [], []
+    for block, length in padded_blocks(states, _block_length(nodes, rule, near)):
+        _, index = _nearest(tree, block / scale, near)
+        around = Neighbourhood(jnp.asarray(node_states[index]), _take(force, index), jnp.asarray(multiplicity[index]))
+        block_estimates, conditioning = _exact_estimates(around, nodes.scale, rule, jnp.asarray(block), orders)
+        estimates.append(_first(block_estimates, length))
+        conditionings.append(np.asarray(conditioning)[:length])
+    return _joined(estimates), np.concatenate(conditionings)
+
+
+@eqx.filter_jit
+def _exact_estimates(
+    around: Neighbourhood,
+    scale: Float[Array, " dim"],
+    rule: Rule,
+    states: Float[Array, "q dim"],
+    orders: tuple[MultiIndex, ...],
+) -> tuple[Float[Array, "q derivatives outputs"], Float[Array, " q"]]:
+    def one(near: Neighbourhood, state: Float[Array, " dim"]) -> tuple[Array, Array]:
+        local = basis_at(near, scale, rule, state)
+        return derivatives_at(local, near, orders), local.conditioning
+
+    return jax.vmap(one)(around, states)
+
+
+def _block_length(nodes: Nodes, rule: Rule, near: int) -> int:
+    """Most states in one block, by the memory that their neighbourhoods take."""
+    return LARGEST_WORK // (near * basis_size(nodes.dim, rule.order))
+
+
+def _nearest(tree: KDTree, points: NDArray[np.float64], count: int) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Distances and indices of the `count` nearest nodes of each point; a basis needs at least two."""
+    distance, index = tree.query(points, count, workers=-1)
+    return np.asarray(distance), np.asarray(index)
+
+
+def _take(force: Float[Array, "nodes outputs"], index: NDArray[np.intp]) -> Float[Array, "q near outputs"]:
+    """Rows of the force; on the host unless it is traced, so that no program depends on the number of nodes."""
+    return force[index] if isinstance(force, Tracer) else jnp.asarray(np.asarray(force)[index])
+
+
+def _first(block: Array, length: int) -> Any:
+    return block[:length] if isinstance(block, Tracer) else np.asarray(block)[:length]
+
+
+def _joined(parts: list[Any]) -> Array:
+    """Blocks end to end; on the host unless one is traced, so that no program depends on the number of states."""
+    traced = any(isinstance(part, Tracer) for part in parts)
+    return jnp.concatenate(parts) if traced else jnp.asarray(np.concatenate(parts))
