@@ -1,7 +1,8 @@
 """Hypotheses to be tried: every cause at every place where it could sit, with its starts."""
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..identification import (
     Hypothesis,
@@ -93,9 +94,12 @@ def own_paths(model: Structure, records: Sequence[Nuisances]) -> tuple[str, ...]
 
 
 def hypothesis(
-    model: Structure, starts: Sequence[Structure], records: Sequence[Nuisances], *, refit: bool = True
+    model: Structure, starts: Sequence[Structure], records: Sequence[Nuisances], *, refit: bool = True, begin: Mapping[str, float] | None = None
 ) -> Hypothesis:
-    """Starts with their unknowns: the model's own values, the effect's numbers, and each record's nuisances."""
+    """Starts with their unknowns: the model's own values, the effect's numbers, and each record's nuisances.
+
+    `begin` holds own values to start from, where they differ from the model's.
+    """
     structures, unknowns = [], []
     trust = dict(model.trust)
     given = set(model.entries())
@@ -104,6 +108,9 @@ def hypothesis(
         effect = [p for p in start.entries() if p not in given]
         structure = with_offsets(start, records)
         mine: list[Unknown] = [own_unknown(structure, p, trust) for p in own]
+        if begin is not None:
+            stated = structure.values()
+            mine = [replace(u, theta=math.log(begin[u.path] / stated[u.path])) for u in mine]
         mine += [effect_unknown(structure, p, records[0]) for p in effect]
         for index, nuisances in enumerate(records):
             mine += nuisance_unknowns(structure, nuisances, index)

@@ -78,11 +78,10 @@ def decide(given: Trial, refitted: Trial, tried: Sequence[Trial], stand_in: Call
     `stand_in` makes the map's trial; it is asked only where the winner leaves something.
     """
     kappa, why = {}, {}
-    nothing = max(given.evidence, refitted.evidence)
     passing = []
     for t in tried:
         kappa[id(t)] = explained(t, refitted)
-        why[id(t)] = _reason(t, kappa[id(t)], explained(t, given), t.evidence - nothing)
+        why[id(t)] = _reason(t, given, refitted)
         if not why[id(t)]:
             passing.append(t)
     alternatives = [given, refitted, *passing]
@@ -108,12 +107,17 @@ def decide(given: Trial, refitted: Trial, tried: Sequence[Trial], stand_in: Call
     return Decision(verdict, winner, chance, kappa, why)
 
 
-def _reason(t: Trial, over_refit: float, over_given: float, better: float) -> str:
+def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
     """Why a candidate is no alternative, or nothing."""
+    over_refit, over_given = explained(t, refitted), explained(t, given)
     if not math.isfinite(t.evidence) or over_refit == -math.inf:
         return "its motion runs away"
+    # A gain error and own values that are all off by the same share predict the same readings: only what is believed
+    # beforehand weighs them, so such a candidate need not beat the refit by a margin, nor leave less.
+    same = t.cause is not None and t.cause.is_sensor and adequate(t) and adequate(refitted)
+    better = t.evidence - (given.evidence if same else max(given.evidence, refitted.evidence))
     if better <= SIGNIFICANT:
-        return f"is not more probable than the model's own values refitted ({better:+.1f} nats)"
+        return f"is not more probable than the model {'as given' if same else 'refitted'} ({better:+.1f} nats)"
     if over_refit >= GATE or (adequate(t) and over_given >= GATE):
         return ""
     return f"explains {max(over_refit, 0.0):.0%} of what a refit leaves; half is the least for a cause"

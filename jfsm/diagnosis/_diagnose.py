@@ -3,14 +3,16 @@
 import math
 import secrets
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import jax
 import numpy as np
+import numpy as np
 
 from .._types import require_x64
-from ..identification import Nuisances, Posterior, maximise, prepare
+from ..identification import Maximum, Nuisances, Posterior, approach, finish, prepare
 from ..records import Record
-from ..structures import Cause, Structure
+from ..structures import AbstractFriction, Cause, Structure
 from ._candidates import Candidate, candidates, chosen_causes, hypothesis
 from ._decide import decide
 from ._diagnosis import Diagnosis
@@ -20,6 +22,11 @@ from ._residual import residual, stand_in
 from ._trial import Trial, trial
 
 Progress = Callable[[str, int, int], None]
+
+_CANDIDATE_LADDER = (0.3, 0.1, 0.03, 0.01)
+"""Rungs for a candidate: the refit has been at the top already."""
+_FAR_BEHIND = 200.0
+"""Nats behind the leader, one per cent of unmodelled force forgiven, from which a candidate is not pursued."""
 
 
 def diagnose(
@@ -74,19 +81,18 @@ def diagnose(
     until = [fit for _, fit in training]
     records = _prepare(whole, until, model)
     tried = candidates(model, records, chosen, places)
-    steps = _Steps(progress, 4 + len(tried))
+    steps = _Steps(progress, 5 + len(tried))
 
     steps.next("the model as given")
     given = _fit("given", model, records, until, refit=False)
     steps.next("the model refitted")
     refitted = _fit("refitted", model, records, until, refit=True)
-    trials = []
-    best = min(given.value, refitted.value)
+    approached = []
+    start = refitted.structure if refitted.evidence > given.evidence else model
     for candidate in tried:
         steps.next(f"{candidate.cause.label} at {candidate.at}")
-        trials += list(_try(candidate, model, records, until, best))
-        best = min(best, *(t.value for t in trials))
-    trials = _best_of_each(trials)
+        approached += list(_approach(candidate, model, start, records, until))
+    trials = _best_of_each(_finished(approached, refitted, steps))
     steps.next("the missing force")
     missing = residual(refitted, model, records[0], until[0])
     periods = sum(n.record.duration for n in records) * records[0].omega / (2 * math.pi)
@@ -141,18 +147,36 @@ def _prepare(records: Sequence[Record], until: Sequence[int], model: Structure) 
 
 def _fit(name: str, model: Structure, records, until, *, refit: bool) -> Trial:
     posterior = Posterior(hypothesis(model, [model], records, refit=refit), records, until)
-    return trial(posterior, maximise(posterior), 0, None, (name,))
+    rung = approach(posterior)
+    return trial(posterior, finish(posterior, rung), 0, None, (name,), float(rung.value[0]))
 
 
-def _try(candidate: Candidate, model: Structure, records, until, best: float) -> Iterator[Trial]:
-    posterior_of = lambda starts: Posterior(hypothesis(model, starts, records), records, until)  # noqa: E731
-    sticks = hasattr(candidate.cause.effect, "limits")
+def _approach(candidate: Candidate, model: Structure, start: Structure, records, until) -> Iterator[tuple[Candidate, Posterior, Maximum]]:
+    """Every start of a candidate brought to the last rung that forgives unmodelled force."""
+    sticks = issubclass(candidate.cause.effect, AbstractFriction)
     groups = [[s] for s in candidate.starts] if sticks else [list(candidate.starts)]
+    # A gain lies on a ridge with the own values: only from the values as given does a climb end at its own end of it.
+    own = None if candidate.cause.is_sensor else {p: v for p, v in start.values().items() if p in model.entries()}
     for starts in groups:
-        posterior = posterior_of(starts)
-        found = maximise(posterior, best=best)
+        posterior = Posterior(hypothesis(model, starts, records, begin=own), records, until)
+        yield candidate, posterior, approach(posterior, _CANDIDATE_LADDER)
+
+
+def _finished(approached: Sequence[tuple[Candidate, Posterior, Maximum]], refitted: Trial, steps: "_Steps") -> list[Trial]:
+    """Trials of all candidates; those far behind on a rung that forgives a little stay at that rung's values."""
+    steps.next("the best candidates")
+    leader = min([refitted.rung, *(float(np.min(rung.value)) for _, _, rung in approached)])
+    trials, best = [], refitted.value
+    for candidate, posterior, rung in sorted(approached, key=lambda item: float(np.min(item[2].value))):
+        behind = float(np.min(rung.value)) - leader
+        found = rung if not behind < _FAR_BEHIND else finish(posterior, rung, best=best)
         for lane in range(posterior.lanes):
-            yield trial(posterior, found, lane, candidate.cause, candidate.at)
+            done = trial(posterior, found, lane, candidate.cause, candidate.at, float(rung.value[lane]))
+            if found is rung:
+                done = replace(done, evidence=refitted.evidence - behind, converged=False)
+            trials.append(done)
+            best = min(best, done.value) if found is not rung else best
+    return trials
 
 
 def _best_of_each(trials: Sequence[Trial]) -> list[Trial]:

@@ -13,6 +13,8 @@ from ..structures import Structure
 
 _PERIODS = 2.0
 """Periods, at least, from which the state of a held-out run is estimated; they are not counted."""
+_CLOSABLE = 1.05
+"""Error before, in floors, from which there is anything to close."""
 _DRAWS = 4
 """Draws of noise that show what it leaves of a perfect model's run."""
 
@@ -55,7 +57,7 @@ class Gain:
 
 
 def _closed(before: float, after: float, floor: float) -> float:
-    return (before - after) / (before - floor) if before > floor else 0.0
+    return (before - after) / (before - floor) if before > _CLOSABLE * floor else 0.0
 
 
 def window_for(record: Record, omega: float) -> int:

@@ -41,6 +41,7 @@ class Trial:
     covariance: np.ndarray
     evidence: float
     value: float
+    rung: float
     converged: bool
     prediction: Prediction
     whiteness: float
@@ -116,7 +117,7 @@ def whiteness(posterior: Posterior, theta: np.ndarray) -> float:
     return worst
 
 
-def trial(posterior: Posterior, maximum: Maximum, lane: int, cause: Cause | None, at: tuple) -> Trial:
+def trial(posterior: Posterior, maximum: Maximum, lane: int, cause: Cause | None, at: tuple, rung: float) -> Trial:
     """The lane of a fit as a trial."""
     hypothesis = posterior.hypothesis
     alone = posterior if posterior.lanes == 1 else Posterior(
@@ -133,6 +134,7 @@ def trial(posterior: Posterior, maximum: Maximum, lane: int, cause: Cause | None
         covariance=np.linalg.pinv(maximum.information[lane], hermitian=True),
         evidence=maximum.evidence(lane),
         value=float(maximum.value[lane]),
+        rung=rung,
         converged=maximum.results[lane].ok,
         prediction=predict(alone, theta),
         whiteness=whiteness(alone, theta),

@@ -1,6 +1,8 @@
 """What values: the likelihood, what is known beforehand, and the fit."""
 
 from ._maximise import Maximum as Maximum
+from ._maximise import approach as approach
+from ._maximise import finish as finish
 from ._maximise import maximise as maximise
 from ._nuisances import Nuisances as Nuisances
 from ._nuisances import prepare as prepare

@@ -8,9 +8,10 @@ import numpy as np
 from .._result import Result
 from ._posterior import Posterior
 
-LADDER = (0.3, 0.03)
-"""Shares of unmodelled force that the first rungs forgive: wide basins first, the true noise last."""
-_RUNG_STEPS = 3
+LADDER = (1.0, 0.3, 0.1, 0.03, 0.01)
+"""Shares of unmodelled force that the first rungs forgive: the top ones compare forces and have wide basins."""
+_LAST_RUNG = 0.003
+_RUNG_STEPS, _RUNG_ENOUGH = 4, 0.5
 _ENOUGH = 0.01
 """A step that promises less than this many nats is the last,"""
 _HOPELESS = 0.02
@@ -36,19 +37,34 @@ class Maximum:
         return float(-self.value[lane] + 0.5 * self.theta.shape[1] * np.log(2 * np.pi) - 0.5 * logdet)
 
 
-def maximise(posterior: Posterior, steps: int = 25, ladder: Sequence[float] = LADDER, best: float = np.inf) -> Maximum:
-    """Climb from every start, first with a process noise that forgives unmodelled force.
+def approach(posterior: Posterior, ladder: Sequence[float] = LADDER, theta: np.ndarray | None = None) -> Maximum:
+    """Climb with a process noise that forgives unmodelled force, less from rung to rung.
+
+    From the true noise alone, a period wrong by some per cent scores worse than no motion at all, and a climb ends
+    there.
+    """
+    theta = posterior.initial() if theta is None else theta
+    for share in ladder[:-1]:
+        theta = _climb(posterior, theta, share, _RUNG_STEPS, _RUNG_ENOUGH).theta
+    return _climb(posterior, theta, ladder[-1], _RUNG_STEPS, _RUNG_ENOUGH)
+
+
+def finish(posterior: Posterior, start: Maximum, steps: int = 25, best: float = np.inf) -> Maximum:
+    """Climb to the top with the true noise.
 
     `best` is the smallest minus log-posterior that any hypothesis reached: one that stays far above it need not be
     exact.
     """
-    theta = posterior.initial()
-    for share in ladder:
-        theta = _climb(posterior, theta, share, _RUNG_STEPS).theta
-    return _climb(posterior, theta, 0.0, steps, best)
+    theta = _climb(posterior, start.theta, _LAST_RUNG, _RUNG_STEPS, _RUNG_ENOUGH).theta
+    return _climb(posterior, theta, 0.0, steps, _ENOUGH, best)
 
 
-def _climb(posterior: Posterior, theta: np.ndarray, slack: float, steps: int, best: float = np.inf) -> Maximum:
+def maximise(posterior: Posterior) -> Maximum:
+    """The most probable values, from every start."""
+    return finish(posterior, approach(posterior))
+
+
+def _climb(posterior: Posterior, theta: np.ndarray, slack: float, steps: int, enough: float, best: float = np.inf) -> Maximum:
     unknowns = posterior.hypothesis.unknowns
     low = np.array([[u.low for u in row] for row in unknowns])
     high = np.array([[u.high for u in row] for row in unknowns])
@@ -60,8 +76,9 @@ def _climb(posterior: Posterior, theta: np.ndarray, slack: float, steps: int, be
     for _ in range(steps):
         move, promise = _steps(theta, gradient, information, damp, low, high, log)
         for lane in np.flatnonzero(open_):
-            behind = max(0.0, value[lane] - min(best, float(np.min(value))))
-            if promise[lane] < _ENOUGH + _HOPELESS * behind and damp[lane] < 1.0:
+            target = min(best, float(np.min(value)))
+            behind = value[lane] - target if np.isfinite(target) and np.isfinite(value[lane]) else 0.0
+            if promise[lane] < enough + _HOPELESS * max(behind, 0.0) and damp[lane] < 1.0:
                 open_[lane], results[lane] = False, Result.successful
             elif damp[lane] > 1e8:
                 open_[lane], results[lane] = False, Result.stalled

@@ -9,8 +9,8 @@ import numpy as np
 from ..structures import Offset, Structure
 from ._nuisances import Nuisances
 
-TRUST = {"stiffness": 0.03, "damping": 0.25, "mass": 0.03}
-"""How far a model's own values are off as a rule, where its owner does not say."""
+TRUST = {"stiffness": 0.02, "damping": 0.25, "mass": 0.01}
+"""How far a model's own values are off as a rule, where its owner does not say: masses are weighed, damping is guessed."""
 DEGREES = 1.5
 """Degrees of freedom of Student's law for own values: right to some per cent as a rule, but far off when wrong."""
 TYPICAL, TYPICAL_SPREAD = 0.15, 1.5

@@ -56,7 +56,7 @@ STYLE: dict[Any, Any] = {
     "savefig.facecolor": "none",
     "svg.fonttype": "none",
     "text.color": INK,
-    "text.parse_math": True,  # a dollar sign in a channel's name is a dollar sign
+    "text.parse_math": False,  # a dollar sign in a channel's name is a dollar sign
     "text.usetex": False,
     "xtick.color": MUTED,
     "xtick.labelcolor": INK,

@@ -1,4 +1,4 @@
-"""The force that the simulation lacks: along each axis of the state with the named law, and as a map over the plane."""
+"""The force that the simulation leaves over: along each axis of the state, and as a map over the plane."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -21,7 +21,7 @@ ZERO_LINE = "#3a444e"  # crosses the pale middle of the colours, in a dark theme
 
 
 def draw_residual(figure: FigureBase, residual: Mapping[str, Any], law: Mapping[str, Any] | None) -> None:
-    """Points of the missing force against displacement and against velocity, the named law's line over them."""
+    """Points of the residual force against displacement and against velocity, the named law's line over them."""
     force, units = curve(residual["force"]), residual.get("unit") or {}
     force_scale = scale_for(peak(force), units.get("force"))
     for place, (axis, other) in enumerate(AXES.items(), start=1):
@@ -32,7 +32,7 @@ def draw_residual(figure: FigureBase, residual: Mapping[str, Any], law: Mapping[
         if law and law.get(f"force_of_{axis}"):
             line = curve(law[axis]) / scale.factor, curve(law[f"force_of_{axis}"]) / force_scale.factor
             axes.plot(*line, color=AFTER, linewidth=2.0, label="named law")
-        label(axes, f"{axis} [{scale.unit}]", f"missing force [{force_scale.unit}]")
+        label(axes, f"{axis} [{scale.unit}]", f"residual force [{force_scale.unit}]")
         key_above(axes, 3)
 
 
@@ -59,11 +59,11 @@ def describe_residual(residual: Mapping[str, Any], law: Mapping[str, Any] | None
     reach = [f"{axis} up to {quantity(peak(curve(residual[axis])), units.get(axis))}" for axis in AXES]
     force = quantity(peak(curve(residual["force"])), units.get("force"))
     line = " The named law is drawn through the points." if law else ""
-    return f"Missing force, up to {force}, against {reach[0]} and against {reach[1]}.{line}"
+    return f"Residual force, up to {force}, against {reach[0]} and against {reach[1]}.{line}"
 
 
 def draw_map(figure: FigureBase, force_map: Mapping[str, Any], units: Mapping[str, str]) -> None:
-    """Filled contours of the missing force over displacement and velocity; pale where the record never was."""
+    """Filled contours of the residual force over displacement and velocity; pale where the record never was."""
     x, v, force = (curve(force_map[part]) for part in ("displacement", "velocity", "force"))
     scales = [
         _scale(values, units.get(kind)) for values, kind in ((x, "displacement"), (v, "velocity"), (force, "force"))
@@ -81,7 +81,7 @@ def draw_map(figure: FigureBase, force_map: Mapping[str, Any], units: Mapping[st
         axes.contourf(x, v, visited.T.astype(float), levels=[-1.0, 0.5], colors=PAPER, alpha=0.7)
         axes.contour(x, v, visited.T.astype(float), levels=[0.5], colors=INK, linewidths=0.8, linestyles="dashed")
     bar = figure.colorbar(filled, ax=axes, pad=0.02, ticks=levels[:: (LEVELS - 1) // 2])
-    bar.set_label(f"missing force [{scales[2].unit}]")
+    bar.set_label(f"residual force [{scales[2].unit}]")
     bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
     axes.grid(False)
     label(axes, f"displacement [{scales[0].unit}]", f"velocity [{scales[1].unit}]")
@@ -93,7 +93,7 @@ def describe_map(force_map: Mapping[str, Any], units: Mapping[str, str]) -> str:
     share = f"; the record visited {100 * np.mean(visited):.0f} % of the plane shown" if visited else ""
     force = curve(force_map["force"])
     low, high = (quantity(float(bound), units.get("force")) for bound in (np.nanmin(force), np.nanmax(force)))
-    return f"Map of the missing force over displacement and velocity, from {low} to {high}{share}."
+    return f"Map of the residual force over displacement and velocity, from {low} to {high}{share}."
 
 
 def _scale(values: Curve, unit: str | None) -> Scale:

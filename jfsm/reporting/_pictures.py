@@ -112,9 +112,9 @@ def _sketches(d: Mapping[str, Any]) -> Iterator[Sketch]:
     if residual and residual.get("force"):
         yield Sketch(
             "residual",
-            "The force that the simulation lacks",
-            "Estimated from the record without assuming a law. The stronger points, where the other coordinate is near "
-            "zero, are those to compare with a law's line.",
+            "The residual force",
+            "What the simulation leaves over, estimated without assuming a law. The stronger points, where the other "
+            "coordinate is near zero, are those to compare with a law's line.",
             describe_residual(residual, law),
             3.9,
             lambda figure: draw_residual(figure, residual, law),
@@ -123,7 +123,7 @@ def _sketches(d: Mapping[str, Any]) -> Iterator[Sketch]:
         units = (residual or {}).get("unit") or {}
         yield Sketch(
             "map",
-            "Map of the missing force",
+            "Map of the residual force",
             "Full colours inside the dashed line, where the record has been; veiled colours are extrapolated. "
             "The solid line is zero force.",
             describe_map(force_map, units),

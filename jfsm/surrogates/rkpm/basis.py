@@ -4,6 +4,7 @@ import functools
 import itertools
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -43,9 +44,23 @@ def monomials(z: Float[Array, "*points dim"], order: int) -> Float[Array, "*poin
     return jnp.stack(monomial_columns([z[..., axis] for axis in range(z.shape[-1])], order), axis=-1)
 
 
-def derivative_target(orders: MultiIndex, order: int) -> np.ndarray:
-    """(-1)^|β| H^β(0), the right-hand side of eqs. 23 and 39 for the derivative β = `orders`; shape (basis,)."""
-    target = np.zeros(basis_size(len(orders), order))
-    position = multi_indices(len(orders), order).index(orders)
-    target[position] = (-1.0) ** sum(orders) * math.prod(math.factorial(e) for e in orders)
-    return target
+class DerivativeTargets(NamedTuple):
+    """Derivatives to be reproduced, as data: one compiled program serves value and every derivative."""
+
+    orders: Float[Array, "derivatives dim"]
+    """Each derivative as a multi-index β."""
+    at_origin: Float[Array, "derivatives basis"]
+    """(-1)^|β| H^β(0), the right-hand sides of eqs. 23 and 39."""
+
+    def per_unit(self, dilation: Float[Array, " dim"]) -> Float[Array, " derivatives"]:
+        """Factor from derivatives by coordinates divided by `dilation` to derivatives by the columns themselves."""
+        return 1.0 / jnp.prod(dilation[None, :] ** self.orders, axis=1)
+
+
+def derivative_targets(derivatives: Sequence[MultiIndex], order: int) -> DerivativeTargets:
+    """Targets of several derivatives for a basis of monomials up to `order`."""
+    dim = len(derivatives[0])
+    at_origin = np.zeros((len(derivatives), basis_size(dim, order)))
+    for row, beta in zip(at_origin, derivatives, strict=True):
+        row[multi_indices(dim, order).index(beta)] = (-1.0) ** sum(beta) * math.prod(map(math.factorial, beta))
+    return DerivativeTargets(jnp.asarray(derivatives, dtype=float), jnp.asarray(at_origin))

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .basis import MultiIndex, basis_size
+from .basis import DerivativeTargets, basis_size
 from .nodes import Nodes
 from .shape_functions import LocalBasis, local_basis
 from .support import choose_dilation, gathered_nodes
@@ -56,22 +56,21 @@ def basis_at(near: Neighbourhood, scale: Float[Array, " dim"], rule: Rule, state
 
 
 def derivatives_at(
-    local: LocalBasis, near: Neighbourhood, orders: tuple[MultiIndex, ...]
+    local: LocalBasis, near: Neighbourhood, targets: DerivativeTargets
 ) -> Float[Array, "derivatives *outputs"]:
     """Σ θ_i^β u_i, eqs. 11 and 46, for several derivatives β of one local basis."""
-    return jnp.stack([jnp.tensordot(local.shape_functions(beta), near.force, axes=1) for beta in orders])
+    return jnp.tensordot(local.shape_functions(targets), near.force, axes=1)
 
 
-def standard_error_at(local: LocalBasis, near: Neighbourhood, state: Float[Array, " dim"]) -> Float[Array, "*outputs"]:
+def standard_error_at(local: LocalBasis, near: Neighbourhood, value: DerivativeTargets) -> Float[Array, "*outputs"]:
     """Standard error of the force; `RKPM.std` states the formula."""
-    psi = local.shape_functions((0,) * state.shape[0])
     force = near.force.reshape(near.force.shape[0], -1)
     weighted = local.root_weight[:, None] * force
     residual = weighted - local.q @ (local.q.T @ weighted)  # √(φc)·e
     freedom = jnp.sum(local.root_weight**2 / near.multiplicity * (1.0 - local.leverage))
     variance = jnp.sum(residual**2, axis=0) / freedom
-    error = jnp.sqrt(variance * jnp.sum(psi**2 / near.multiplicity))
-    return error.reshape(near.force.shape[1:])
+    spread = jnp.sum(local.shape_functions(value)[0] ** 2 / near.multiplicity)
+    return jnp.sqrt(variance * spread).reshape(near.force.shape[1:])
 
 
 def degenerate_message(nodes: Nodes, rule: Rule) -> str:

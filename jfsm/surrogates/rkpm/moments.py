@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jax.scipy.linalg import cho_solve
 from jaxtyping import Array, Float
 
-from .basis import MultiIndex, monomial_columns, multi_indices
+from .basis import DerivativeTargets, MultiIndex, monomial_columns, multi_indices
 from .estimates import Rule
 from .shape_functions import window_weights
 from .support import support_radius
@@ -28,8 +28,7 @@ def moment_estimates(
     force: Float[Array, "points near outputs"],
     distance: Float[Array, "points near_and_next"],
     scale: Float[Array, " dim"],
-    orders: Float[Array, "derivatives dim"],
-    targets: Float[Array, "derivatives basis"],
+    targets: DerivativeTargets,
     rule: Rule,
 ) -> tuple[Float[Array, "points derivatives outputs"], Float[Array, " points"]]:
     """Derivatives of the map at many points, and the pivot ratio that says whether to trust them.
@@ -45,9 +44,6 @@ def moment_estimates(
         Length of the offsets, rising, and that of the next node, where the support ends; without it if there is none.
     scale : (dim,) float array
         Scale of the offsets per axis, in its unit.
-    orders, targets : (derivatives, dim) and (derivatives, basis) float array
-        Each derivative as a multi-index and as the right-hand side of eq. 43, `derivative_target`. They are data, so
-        that one program serves value and derivatives.
 
     Returns
     -------
@@ -69,21 +65,15 @@ def moment_estimates(
     basis = multi_indices(dim, order)
     matrix = [[moments[_plus(alpha, beta)] for beta in basis[: row + 1]] for row, alpha in enumerate(basis)]
     solve = _solve_unrolled if len(basis) <= UNROLLED else _solve_batched
-    correction, ratio = solve(matrix, targets)
+    correction, ratio = solve(matrix, targets.at_origin)
     loads = [jnp.sum((weight * column)[..., None] * force, axis=1) for column in columns[: len(basis)]]  # Σ H φ u
     estimates = sum(b[..., None] * load[None] for b, load in zip(correction, loads, strict=True))
-    unit = jnp.prod(
-        (dilation[:, None] * scale[None, :])[None] ** orders[:, None, :], axis=-1
-    )  # d/dx = (1/dilation) d/dz
-    return jnp.moveaxis(estimates / unit[..., None], 0, 1), ratio
+    unit = jax.vmap(targets.per_unit, out_axes=1)(dilation[:, None] * scale[None, :])
+    return jnp.moveaxis(estimates * unit[..., None], 0, 1), ratio
 
 
 def _plus(a: MultiIndex, b: MultiIndex) -> MultiIndex:
     return tuple(i + j for i, j in zip(a, b, strict=True))
-
-
-def _finite_ratio(ratio: Column) -> Column:
-    return jnp.where(jnp.isfinite(ratio), ratio, 0.0)
 
 
 def _solve_unrolled(

@@ -14,7 +14,7 @@ from scipy.spatial import KDTree
 
 from ..._types import as_array, require_x64
 from .._map import AbstractForceStateMap
-from .basis import MultiIndex, basis_size
+from .basis import DerivativeTargets, MultiIndex, basis_size, derivative_targets
 from .estimates import (
     SINGULAR,
     Neighbourhood,
@@ -125,16 +125,16 @@ class RKPM(AbstractForceStateMap):
         RuntimeError
             If the nodes around the state cannot tell the monomials apart.
         """
-        return _derivatives(self, self._state(state), ((0,) * self.dim,))[0]
+        return _derivatives(self, self._state(state), self._targets([(0,) * self.dim]))[0]
 
     def gradient(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs dim"]:
         """First derivatives at one state, reproduced exactly for polynomials (eq. 46)."""
-        axes = tuple(tuple(int(i == axis) for i in range(self.dim)) for axis in range(self.dim))
-        return jnp.moveaxis(_derivatives(self, self._state(state), axes), 0, -1)
+        axes = [tuple(int(i == axis) for i in range(self.dim)) for axis in range(self.dim)]
+        return jnp.moveaxis(_derivatives(self, self._state(state), self._targets(axes)), 0, -1)
 
     def derivative(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
         """Derivative at one state; ``orders=(3, 0)`` is the third one in the first column (eq. 46)."""
-        return _derivatives(self, self._state(state), (self._orders(orders),))[0]
+        return _derivatives(self, self._state(state), self._targets([orders]))[0]
 
     def std(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
         r"""Standard error of the force at one state from the scatter of the neighbours about the local fit.
@@ -161,7 +161,7 @@ class RKPM(AbstractForceStateMap):
                 f"`std` needs more neighbours than the {size} monomials; the map was fitted with "
                 f"{self.rule.neighbours}. Enlarge `neighbours`."
             )
-        return _standard_error(self, self._state(state))
+        return _standard_error(self, self._state(state), self._targets([(0,) * self.dim]))
 
     def evaluate_derivatives(
         self, states: Float[ArrayLike, "q dim"], orders: Sequence[MultiIndex]
@@ -175,10 +175,10 @@ class RKPM(AbstractForceStateMap):
         RuntimeError
             If the nodes around some state cannot tell the monomials apart.
         """
-        checked = tuple(self._orders(one) for one in orders)
+        targets = self._targets(orders)
         if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves((states, self.nodes.states, self.rule))):
-            return jax.vmap(lambda state: _derivatives(self, self._state(state), checked))(jnp.asarray(states))
-        return evaluate_many(self.nodes, self.rule, self._states(states), checked)
+            return jax.vmap(lambda state: _derivatives(self, self._state(state), targets))(jnp.asarray(states))
+        return evaluate_many(self.nodes, self.rule, self._states(states), targets)
 
     def visited(self, states: Float[ArrayLike, "q dim"]) -> Bool[NDArray[np.bool_], " q"]:
         """Whether each state has a node within `reach`: the distance of 95 in 100 nodes to their n*-th neighbour.
@@ -204,6 +204,9 @@ class RKPM(AbstractForceStateMap):
             )
         return state
 
+    def _targets(self, derivatives: Sequence[MultiIndex]) -> DerivativeTargets:
+        return derivative_targets([self._orders(orders) for orders in derivatives], self.rule.order)
+
     def _orders(self, orders: Any) -> MultiIndex:
         orders = tuple(orders)
         whole = all(isinstance(o, int | np.integer) and o >= 0 for o in orders)
@@ -217,16 +220,16 @@ class RKPM(AbstractForceStateMap):
 
 @eqx.filter_jit
 def _derivatives(
-    force_map: RKPM, state: Float[Array, " dim"], orders: tuple[MultiIndex, ...]
+    force_map: RKPM, state: Float[Array, " dim"], targets: DerivativeTargets
 ) -> Float[Array, "derivatives *outputs"]:
     near, local = _checked_basis(force_map, state)
-    return derivatives_at(local, near, orders)
+    return derivatives_at(local, near, targets)
 
 
 @eqx.filter_jit
-def _standard_error(force_map: RKPM, state: Float[Array, " dim"]) -> Float[Array, "*outputs"]:
+def _standard_error(force_map: RKPM, state: Float[Array, " dim"], value: DerivativeTargets) -> Float[Array, "*outputs"]:
     near, local = _checked_basis(force_map, state)
-    return standard_error_at(local, near, state)
+    return standard_error_at(local, near, value)
 
 
 def _checked_basis(force_map: RKPM, state: Float[Array, " dim"]) -> tuple[Neighbourhood, LocalBasis]:

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jax.scipy.linalg import solve_triangular
 from jaxtyping import Array, Float
 
-from .basis import MultiIndex, derivative_target, monomials
+from .basis import DerivativeTargets, MultiIndex, derivative_targets, monomials
 from .windows import AbstractWindow
 
 
@@ -30,11 +30,10 @@ class LocalBasis(NamedTuple):
         """Share of each node's own reading in the fit at that node, 0 to 1."""
         return jnp.sum(self.q**2, axis=1)
 
-    def shape_functions(self, orders: MultiIndex) -> Float[Array, " nodes"]:
-        """θ_i^β of eq. 46; for ``orders`` all zero ψ_i of eq. 28."""
-        target = jnp.asarray(derivative_target(orders, self.order), self.r.dtype)
-        scaled = target / jnp.prod(self.dilation ** jnp.asarray(orders))  # d/dx = (1/dilation) d/dz
-        return self.root_weight * (self.q @ solve_triangular(self.r, scaled, trans=1))
+    def shape_functions(self, targets: DerivativeTargets) -> Float[Array, "derivatives nodes"]:
+        """θ_i^β of eq. 46 for each target β; ψ_i of eq. 28 where its orders are zero."""
+        scaled = targets.at_origin * targets.per_unit(self.dilation)[:, None]
+        return self.root_weight[None, :] * (self.q @ solve_triangular(self.r, scaled.T, trans=1)).T
 
 
 def window_weights(z: Float[Array, "nodes dim"], window: AbstractWindow) -> Float[Array, " nodes"]:
@@ -121,4 +120,5 @@ def shape_functions(
     :math:`\theta_i^\beta(x) = (-1)^{|\beta|} H^T(x - x_i) M^{-1}(x) H^\beta(0) \phi_a(x - x_i)`, eqs. 28 and 46.
     """
     local = local_basis(point, nodes, dilation, order=order, window=window)
-    return local.shape_functions((0,) * point.shape[0] if orders is None else orders)
+    beta = (0,) * point.shape[0] if orders is None else orders
+    return local.shape_functions(derivative_targets([beta], order))[0]
