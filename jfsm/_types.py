@@ -54,5 +54,7 @@ def as_array(value: Any, name: str, ndim: int | tuple[int, ...]) -> np.ndarray:
     array = array.astype(np.float64)
     if not np.all(np.isfinite(array)):
         bad = int(np.sum(~np.isfinite(array)))
-        raise ValueError(f"`{name}` must be finite; {bad} of {array.size} values are NaN or infinite. Remove or fill them.")
+        raise ValueError(
+            f"`{name}` must be finite; {bad} of {array.size} values are NaN or infinite. Remove or fill them."
+        )
     return array

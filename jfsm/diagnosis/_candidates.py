@@ -47,12 +47,17 @@ def chosen_causes(selection: Sequence[str | Cause] | None) -> dict[str, Cause]:
         elif item in known:
             found[item] = known[item]
         else:
-            raise ValueError(f"`causes` must name causes of the catalogue ({', '.join(known)}) or be jfsm.Cause objects; got {item!r}.")
+            raise ValueError(
+                f"`causes` must name causes of the catalogue ({', '.join(known)}) or be causes; got {item!r}."
+            )
     return found
 
 
 def candidates(
-    model: Structure, records: Sequence[Nuisances], selection: Mapping[str, Cause], places: Sequence[tuple] | None = None
+    model: Structure,
+    records: Sequence[Nuisances],
+    selection: Mapping[str, Cause],
+    places: Sequence[tuple] | None = None,
 ) -> list[Candidate]:
     """Every cause of `selection` at every place: link laws on the model's links, sensor effects on the channels."""
     found = []
@@ -78,7 +83,11 @@ def _starts(model: Structure, cause: Cause, at: tuple, nuisances: Nuisances) -> 
         parameter = cause.effect.parameters[0]
         unit = cause.effect(**{p.name: float(sign) for p in cause.effect.parameters}, at=at)
         extended = model + unit
-        path = next(p for p in reversed(extended.entries()) if p.startswith(f"{unit.kind}@") and p.split(".")[1].startswith(parameter.name))
+        path = next(
+            p
+            for p in reversed(extended.entries())
+            if p.startswith(f"{unit.kind}@") and p.split(".")[1].startswith(parameter.name)
+        )
         structures.append(extended.with_values({path: sign * _START * natural_size(extended, path, nuisances)}))
     return tuple(structures)
 
@@ -94,7 +103,12 @@ def own_paths(model: Structure, records: Sequence[Nuisances]) -> tuple[str, ...]
 
 
 def hypothesis(
-    model: Structure, starts: Sequence[Structure], records: Sequence[Nuisances], *, refit: bool = True, begin: Mapping[str, float] | None = None
+    model: Structure,
+    starts: Sequence[Structure],
+    records: Sequence[Nuisances],
+    *,
+    refit: bool = True,
+    begin: Mapping[str, float] | None = None,
 ) -> Hypothesis:
     """Starts with their unknowns: the model's own values, the effect's numbers, and each record's nuisances.
 

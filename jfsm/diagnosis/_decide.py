@@ -72,7 +72,9 @@ def probabilities(trials: Sequence[Trial], periods: float) -> np.ndarray:
     return 0.995 * share / np.sum(share) + 0.005 / len(trials)
 
 
-def decide(given: Trial, refitted: Trial, tried: Sequence[Trial], stand_in: Callable[[], Trial | None], periods: float) -> Decision:
+def decide(
+    given: Trial, refitted: Trial, tried: Sequence[Trial], stand_in: Callable[[], Trial | None], periods: float
+) -> Decision:
     """Verdict over the model as given, the model refitted, every candidate, and a map that stands for any law.
 
     `stand_in` makes the map's trial; it is asked only where the winner leaves something.
@@ -94,7 +96,11 @@ def decide(given: Trial, refitted: Trial, tried: Sequence[Trial], stand_in: Call
     mapped = None if adequate(winner) else stand_in()
     verdict = _verdict(given, refitted, winner, tried, mapped)
     if verdict == "cause" and chance[id(winner)] < 0.5:
-        families = [t for t in passing if t.cause is not None and winner.cause is not None and t.cause.family == winner.cause.family]
+        families = [
+            t
+            for t in passing
+            if t.cause is not None and winner.cause is not None and t.cause.family == winner.cause.family
+        ]
         if sum(chance[id(t)] for t in families) < 0.8:
             verdict = "undecided"
     if verdict == "consistent":

@@ -66,14 +66,23 @@ def window_for(record: Record, omega: float) -> int:
 
 
 def measure_gain(
-    given: Structure, refitted: Structure, extended: Structure, records: list[Record], noise: Mapping[tuple, float], omega: float, reconstruction: Reconstruction, key: jax.Array
+    given: Structure,
+    refitted: Structure,
+    extended: Structure,
+    records: list[Record],
+    noise: Mapping[tuple, float],
+    omega: float,
+    reconstruction: Reconstruction,
+    key: jax.Array,
 ) -> tuple[Gain, list[dict]]:
     """Gain on held-out records, and per record the curves behind it (measured, before, after).
 
     `noise` is the standard deviation of each channel's noise.
     """
     seed = np.random.default_rng(np.asarray(jax.random.key_data(key)).astype(np.uint32).tolist())
-    squares: dict[str, dict[tuple, list[float]]] = {name: {} for name in ("before", "refitted", "after", "floor", "spread")}
+    squares: dict[str, dict[tuple, list[float]]] = {
+        name: {} for name in ("before", "refitted", "after", "floor", "spread")
+    }
     curves = []
     for record in records:
         window = window_for(record, omega)
@@ -92,7 +101,9 @@ def measure_gain(
     rms = {name: {c: math.sqrt(float(np.mean(v))) for c, v in table.items()} for name, table in squares.items()}
     units = records[0].units
     channels = {
-        f"{kind} {j}": ChannelGain(units[kind], rms["spread"][kind, j], *(rms[n][kind, j] for n in ("before", "refitted", "after", "floor")))
+        f"{kind} {j}": ChannelGain(
+            units[kind], rms["spread"][kind, j], *(rms[n][kind, j] for n in ("before", "refitted", "after", "floor"))
+        )
         for kind, j in rms["before"]
     }
     total = {
@@ -102,19 +113,26 @@ def measure_gain(
     return Gain(**total, channels=channels), curves
 
 
-def _run(model: Structure, record: Record, window: int, reconstruction: Reconstruction, state=None) -> dict[tuple, np.ndarray]:
+def _run(
+    model: Structure, record: Record, window: int, reconstruction: Reconstruction, state=None
+) -> dict[tuple, np.ndarray]:
     response = simulate(model, record, state, window=window, reconstruction=reconstruction, solver="grid")
     shown = response.readings(record)
     # A run that escaped counts as one that stays at its last value: bad, and finite.
     return {c: np.concatenate([y, np.full(len(record) - y.size, y[-1] if y.size else 0.0)]) for c, y in shown.items()}
 
 
-def _noise(model, record: Record, window: int, reconstruction, run, levels: Mapping[tuple, float], rng) -> dict[tuple, float]:
+def _noise(
+    model, record: Record, window: int, reconstruction, run, levels: Mapping[tuple, float], rng
+) -> dict[tuple, float]:
     """Mean square error that noise alone leaves, per channel: its readings', its drive's and its start's."""
     total = {c: 0.0 for c in record.responses}
     for _ in range(_DRAWS):
         # The extended model's own run stands for the truth; fresh noise on what was measured, and all steps again.
-        noisy = {c: (run[c] if c in run else y) + levels.get(c, 0.0) * rng.standard_normal(len(record)) for c, y in record.channels.items()}
+        noisy = {
+            c: (run[c] if c in run else y) + levels.get(c, 0.0) * rng.standard_normal(len(record))
+            for c, y in record.channels.items()
+        }
         again = _run(model, _like(record, noisy), window, reconstruction)
         for c in total:
             total[c] += float(np.mean((again[c] - run[c])[window:] ** 2)) / _DRAWS
@@ -125,4 +143,6 @@ def _like(record: Record, channels: dict[tuple, np.ndarray]) -> Record:
     kinds: dict[str, dict[int, np.ndarray]] = {}
     for (kind, j), y in channels.items():
         kinds.setdefault(kind, {})[j] = y
-    return Record(record.time, **kinds, base_acceleration=record.base_acceleration, at_rest=record.at_rest, drive=record.drive)  # pyright: ignore
+    return Record(
+        record.time, **kinds, base_acceleration=record.base_acceleration, at_rest=record.at_rest, drive=record.drive
+    )  # pyright: ignore

@@ -34,9 +34,13 @@ def assemble(
     """The diagnosis, with everything that the report needs."""
     units = records[0].record.units
     findings = _findings(decision, trials, model, units)
-    candidates = tuple(_candidate(t, decision, refitted, model, units) for t in sorted(trials, key=lambda t: -t.evidence))
+    candidates = tuple(
+        _candidate(t, decision, refitted, model, units) for t in sorted(trials, key=lambda t: -t.evidence)
+    )
     winner = decision.winner if decision.winner.at != ("given",) else refitted
-    refit = {p: _estimate(winner, p, model, units) for p in model.entries() if any(u.path == p for u in winner.unknowns)}
+    refit = {
+        p: _estimate(winner, p, model, units) for p in model.entries() if any(u.path == p for u in winner.unknowns)
+    }
     notes = tuple(dict.fromkeys(note for n in records for note in n.notes))
     noise = {f"{kind} {j}": float(s) for n in records[:1] for (kind, j), s in zip(n.channels, n.floor, strict=True)}
     sentence, advice = _words(decision, findings, gain)
@@ -57,8 +61,8 @@ def assemble(
         "curves": {"holdout": _holdout(runs), **curves(missing, units, _law(decision, extended))},
     }
     return Diagnosis(
-        verdict=decision.verdict, findings=findings, candidates=candidates, extended=extended, refitted=refit, gain=gain,
-        detectable={}, noise=noise, notes=notes, sentence=sentence, advice=advice, data=data,
+        verdict=decision.verdict, findings=findings, candidates=candidates, extended=extended, refitted=refit,
+        gain=gain, detectable={}, noise=noise, notes=notes, sentence=sentence, advice=advice, data=data,
     )  # fmt: skip
 
 
@@ -94,7 +98,9 @@ def _findings(decision: Decision, trials: list[Trial], model: Structure, units) 
     winner = decision.winner
     if decision.verdict == "cause" and winner.cause is not None:
         rivals = tuple(
-            Rival(t.name, t.at, decision.share(t)) for t in sorted(trials, key=decision.share, reverse=True) if t is not winner and decision.share(t) > _RIVAL
+            Rival(t.name, t.at, decision.share(t))
+            for t in sorted(trials, key=decision.share, reverse=True)
+            if t is not winner and decision.share(t) > _RIVAL
         )
         parameters = _effect(winner, model, units)
         cause = winner.cause
@@ -116,7 +122,20 @@ def _wrong_values(t: Trial, probability: float, model: Structure, units) -> tupl
             at = tuple(int(p) for p in place.split("-"))
             name = u.path.split(".")[-1] if "." in u.path else "mass"
             sentence = f"{kind} is off: stated {model.values()[u.path]:.6g}, found {t.interval(u.path)[0]:.6g}"
-            found.append((moved / u.width, Finding(PARAMETER_CAUSES[kind], "parameters", at, probability, {name: _estimate(t, u.path, model, units)}, (), sentence)))
+            found.append(
+                (
+                    moved / u.width,
+                    Finding(
+                        PARAMETER_CAUSES[kind],
+                        "parameters",
+                        at,
+                        probability,
+                        {name: _estimate(t, u.path, model, units)},
+                        (),
+                        sentence,
+                    ),
+                )
+            )
     return tuple(f for _, f in sorted(found, key=lambda item: -item[0]))
 
 
@@ -131,7 +150,11 @@ def _candidate(t: Trial, decision: Decision, refitted: Trial, model: Structure, 
 
 
 def _words(decision: Decision, findings: tuple[Finding, ...], gain: Gain | None) -> tuple[str, str]:
-    share = "" if gain is None else f" The free-run error on held-out readings goes from {gain.before:.2%} to {gain.after:.2%} of the signal."
+    share = (
+        ""
+        if gain is None
+        else f" The free-run error on held-out readings goes from {gain.before:.2%} to {gain.after:.2%} of the signal."
+    )
     if decision.verdict == "consistent":
         return "The record shows nothing beyond noise that the model lacks.", "Keep the model as it is."
     if decision.verdict == "parameters":
@@ -140,10 +163,19 @@ def _words(decision: Decision, findings: tuple[Finding, ...], gain: Gain | None)
     if decision.verdict == "cause":
         f = findings[0]
         where = "-".join(str(a) for a in f.at)
-        return f"The model lacks {decision.winner.cause.label} at {where}: {f.sentence}.{share}", "Use the extended model."  # pyright: ignore
+        return (
+            f"The model lacks {decision.winner.cause.label} at {where}: {f.sentence}.{share}",
+            "Use the extended model.",
+        )  # pyright: ignore
     if decision.verdict == "unnamed":
-        return f"A real effect is there that no catalogue entry explains; a map stands in.{share}", "Look at the map's shape; record a second run with another amplitude."
-    return "Something is wrong beyond noise, and this record cannot tell what.", "Record a second run with another amplitude, or measure the missing channels."
+        return (
+            f"A real effect is there that no catalogue entry explains; a map stands in.{share}",
+            "Look at the map's shape; record a second run with another amplitude.",
+        )
+    return (
+        "Something is wrong beyond noise, and this record cannot tell what.",
+        "Record a second run with another amplitude, or measure the missing channels.",
+    )
 
 
 def _record(records: list[Nuisances]) -> dict[str, Any]:
@@ -153,7 +185,13 @@ def _record(records: list[Nuisances]) -> dict[str, Any]:
         {"name": f"{kind} {j}", "unit": record.units[kind], "rms": float(s), "noise": float(f)}
         for (kind, j), s, f in zip(first.channels, first.spread, first.floor, strict=True)
     ]
-    return {"name": record.name, "samples": sum(n.samples for n in records), "sample_rate": 1 / record.dt, "duration": record.duration, "channels": channels}
+    return {
+        "name": record.name,
+        "samples": sum(n.samples for n in records),
+        "sample_rate": 1 / record.dt,
+        "duration": record.duration,
+        "channels": channels,
+    }
 
 
 def _gain(gain: Gain) -> dict[str, Any]:
@@ -163,7 +201,14 @@ def _gain(gain: Gain) -> dict[str, Any]:
         for key in ("before", "refitted", "after", "floor"):
             row[key], row[f"{key}_nrmse"] = getattr(c, key), getattr(c, key) / c.spread
         channels[name] = row
-    return {"closed": gain.closed, "before": gain.before, "refitted": gain.refitted, "after": gain.after, "floor": gain.floor, "channels": channels}
+    return {
+        "closed": gain.closed,
+        "before": gain.before,
+        "refitted": gain.refitted,
+        "after": gain.after,
+        "floor": gain.floor,
+        "channels": channels,
+    }
 
 
 def _holdout(runs: list[dict]) -> dict[str, Any] | None:
@@ -172,7 +217,12 @@ def _holdout(runs: list[dict]) -> dict[str, Any] | None:
     record, before, after = (runs[0][k] for k in ("record", "before", "after"))
     take = slice(0, _SHOWN)
     channels = {
-        f"{c[0]} {c[1]}": {"unit": record.units[c[0]], "measured": _list(y[take]), "before": _list(before[c][take]), "after": _list(after[c][take])}
+        f"{c[0]} {c[1]}": {
+            "unit": record.units[c[0]],
+            "measured": _list(y[take]),
+            "before": _list(before[c][take]),
+            "after": _list(after[c][take]),
+        }
         for c, y in record.responses.items()
     }
     return {"time": _list(record.time[take]), "channels": channels}

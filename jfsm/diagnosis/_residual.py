@@ -38,8 +38,8 @@ def residual(trial: Trial, model: Structure, nuisances: Nuisances, until: int) -
     readings, fine = nuisances.readings, nuisances.fine
     found = latent_force(
         plant, nuisances.show, nuisances.record.time, np.asarray(fine.force)[:n, 0], np.asarray(fine.base)[:n, 0],
-        np.asarray(readings.values)[:n], np.asarray(readings.use)[:n], readings.variance, nuisances.noise.force_variance,
-        nuisances.omega, nuisances.length,
+        np.asarray(readings.values)[:n], np.asarray(readings.use)[:n],
+        readings.variance, nuisances.noise.force_variance, nuisances.omega, nuisances.length,
     )  # fmt: skip
     rows = np.array([direction(at, model.dof) for at in model.links])
     # Forces on degrees of freedom as forces on links: exact for a chain, least squares otherwise.
@@ -49,7 +49,9 @@ def residual(trial: Trial, model: Structure, nuisances: Nuisances, until: int) -
     count = min(until, n)
     take = np.unique(np.linspace(0, count - 1, min(count, _NODES)).astype(int))
     try:
-        force_map = RKPM.fit(np.column_stack([d, w])[take], f[take], order=3, neighbours=min(_NEIGHBOURS, take.size // 2))
+        force_map = RKPM.fit(
+            np.column_stack([d, w])[take], f[take], order=3, neighbours=min(_NEIGHBOURS, take.size // 2)
+        )
     except (ValueError, RuntimeError):  # one orbit only, or too few points: there is no surface to draw
         force_map = None
     return Residual(tuple(model.links[link]), d, w, f, force_map)
@@ -66,7 +68,12 @@ def stand_in(found: Residual, refitted: Trial, records: list[Nuisances], until: 
     structure = refitted.structure + table.on(found.at)
     posterior = Posterior(Hypothesis((structure,), (refitted.unknowns,)), records, until)
     return replace(
-        refitted, cause=None, at=("map", *found.at), structure=structure, evidence=-math.inf, prediction=predict(posterior, refitted.theta)
+        refitted,
+        cause=None,
+        at=("map", *found.at),
+        structure=structure,
+        evidence=-math.inf,
+        prediction=predict(posterior, refitted.theta),
     )
 
 
@@ -78,8 +85,15 @@ def table_of(found: Residual) -> HermiteTable | None:
 def curves(found: Residual, units, term: AbstractTerm | None) -> dict[str, Any]:
     """Points, map and law for the report, as plain lists."""
     take = np.unique(np.linspace(0, found.force.size - 1, min(found.force.size, 1500)).astype(int))
-    points = {"at": list(found.at), "displacement": found.displacement[take].tolist(), "velocity": found.velocity[take].tolist()}
-    points |= {"force": found.force[take].tolist(), "unit": {k: units[k] for k in ("displacement", "velocity", "force")}}
+    points = {
+        "at": list(found.at),
+        "displacement": found.displacement[take].tolist(),
+        "velocity": found.velocity[take].tolist(),
+    }
+    points |= {
+        "force": found.force[take].tolist(),
+        "unit": {k: units[k] for k in ("displacement", "velocity", "force")},
+    }
     x = np.linspace(found.displacement.min(), found.displacement.max(), _GRID)
     v = np.linspace(found.velocity.min(), found.velocity.max(), _GRID)
     drawn: dict[str, Any] = {"residual": points, "map": None, "law": None}
@@ -87,7 +101,12 @@ def curves(found: Residual, units, term: AbstractTerm | None) -> dict[str, Any]:
         states = np.stack(np.meshgrid(x, v, indexing="ij"), -1).reshape(-1, 2)
         values = np.asarray(found.force_map.evaluate(states)).reshape(_GRID, _GRID)
         visited = np.asarray(found.force_map.visited(states)).reshape(_GRID, _GRID)
-        drawn["map"] = {"displacement": x.tolist(), "velocity": v.tolist(), "force": values.tolist(), "visited": visited.tolist()}
+        drawn["map"] = {
+            "displacement": x.tolist(),
+            "velocity": v.tolist(),
+            "force": values.tolist(),
+            "visited": visited.tolist(),
+        }
     if term is not None:
         zero = np.zeros(())
         drawn["law"] = {

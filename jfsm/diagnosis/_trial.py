@@ -9,6 +9,8 @@ from ..structures import Cause, Structure
 
 _FILTERED, _PREDICTED = 2.0, 3.0
 """Periods of filtering before, and of free prediction in, every window."""
+_RUN_AWAY = 1e6
+"""Error, in spreads of a channel, at which a prediction counts as run away."""
 _SLACKS = (0.0, 0.01, 0.05)
 """How loosely the state may be held while it is filtered; each hypothesis is judged by its best."""
 
@@ -55,7 +57,9 @@ class Trial:
 
     def extended(self) -> Structure:
         """The structure without the offsets that are not significant."""
-        return without_small_offsets(self.structure, self.unknowns, self.theta, np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
+        return without_small_offsets(
+            self.structure, self.unknowns, self.theta, np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        )
 
     def interval(self, path: str, width: float = 1.96) -> tuple[float, float, float]:
         """Value, low and high of an unknown; symmetric in its own coordinate."""
@@ -87,7 +91,8 @@ def predict(posterior: Posterior, theta: np.ndarray) -> Prediction:
             for chosen in sets(nuisances, posterior.until[index]):
                 mask = (scored & chosen)[:, None] & alive
                 count = np.maximum(mask.sum(0), 1)
-                errors.append(np.sum(np.sum(np.where(mask, found.error**2, 0.0), 0) / count / nuisances.spread**2))
+                share = np.clip(found.error / nuisances.spread, -_RUN_AWAY, _RUN_AWAY)
+                errors.append(np.sum(np.sum(np.where(mask, share**2, 0.0), 0) / count))
                 expected.append(np.sum(np.sum(np.where(mask, truth.variance, 0.0), 0) / count / nuisances.spread**2))
         error = np.nan_to_num(np.array(errors), nan=np.inf)
         best.append((float(np.sum(error)), error, np.array(expected)))
@@ -120,8 +125,12 @@ def whiteness(posterior: Posterior, theta: np.ndarray) -> float:
 def trial(posterior: Posterior, maximum: Maximum, lane: int, cause: Cause | None, at: tuple, rung: float) -> Trial:
     """The lane of a fit as a trial."""
     hypothesis = posterior.hypothesis
-    alone = posterior if posterior.lanes == 1 else Posterior(
-        Hypothesis((hypothesis.structures[lane],), (hypothesis.unknowns[lane],)), posterior.records, posterior.until
+    alone = (
+        posterior
+        if posterior.lanes == 1
+        else Posterior(
+            Hypothesis((hypothesis.structures[lane],), (hypothesis.unknowns[lane],)), posterior.records, posterior.until
+        )
     )
     theta, unknowns = maximum.theta[lane], hypothesis.unknowns[lane]
     scales = np.array([t for u, t in zip(unknowns, theta, strict=True) if u.path.startswith("noise@")])
@@ -141,5 +150,3 @@ def trial(posterior: Posterior, maximum: Maximum, lane: int, cause: Cause | None
         noise=scales,
         trusted=np.concatenate([n.trusted for n in posterior.records]),
     )
-
-

@@ -41,7 +41,11 @@ def reconstruct(
     offsets = np.arange(-width + 1, width + 1)
     for phase in range(1, factor):
         distance = phase / factor - offsets
-        taps = np.sinc(distance) * np.i0(_KAISER_BETA * np.sqrt(np.maximum(0.0, 1 - (distance / width) ** 2))) / np.i0(_KAISER_BETA)
+        taps = (
+            np.sinc(distance)
+            * np.i0(_KAISER_BETA * np.sqrt(np.maximum(0.0, 1 - (distance / width) ** 2)))
+            / np.i0(_KAISER_BETA)
+        )
         taps /= taps.sum()  # a constant force stays what it is
         for j in range(samples.shape[1]):
             # offset o multiplies sample k + o

@@ -51,7 +51,13 @@ def measured_force(record: Record, dof: int) -> np.ndarray:
 
 
 def excitation(
-    record: Record, dof: int, substeps: int, method: Reconstruction = "band-limited", *, length: int | None = None, force: np.ndarray | None = None
+    record: Record,
+    dof: int,
+    substeps: int,
+    method: Reconstruction = "band-limited",
+    *,
+    length: int | None = None,
+    force: np.ndarray | None = None,
 ) -> Fine:
     """Drive of a record on half steps, padded to `length` samples with nothing.
 
@@ -67,4 +73,6 @@ def excitation(
     intervals = np.zeros((padded, factor + 1, dof + 1))
     intervals[:n] = fine[take]
     time = record.time[0] + record.dt * np.arange(padded)
-    return Fine(jnp.asarray(intervals[..., :dof]), jnp.asarray(intervals[..., dof]), jnp.asarray(time), jnp.asarray(record.dt))
+    return Fine(
+        jnp.asarray(intervals[..., :dof]), jnp.asarray(intervals[..., dof]), jnp.asarray(time), jnp.asarray(record.dt)
+    )

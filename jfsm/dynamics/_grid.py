@@ -8,7 +8,6 @@ from jaxtyping import Array, Float
 from ._plant import Plant
 from ._stepper import Load, Motion, acceleration, advance, inverse_mass, mode_at
 
-
 _UNROLLED = 4
 """Substeps up to which a smooth step is written out: faster to run, still quick to compile."""
 
@@ -30,7 +29,9 @@ class Fine(eqx.Module):
         return (self.force.shape[1] - 1) // 2
 
 
-def true_force(plant: Plant, force: Float[Array, "halves dof"], base: Float[Array, " halves"]) -> Float[Array, "halves dof"]:
+def true_force(
+    plant: Plant, force: Float[Array, "halves dof"], base: Float[Array, " halves"]
+) -> Float[Array, "halves dof"]:
     """Force on the masses from the measured one: gain and offset of its sensor undone, the base's inertia added."""
     inertia = jnp.sum(plant.mass, 1)
     return (force - plant.force_offset) / (1.0 + plant.force_gain) - base[:, None] * inertia

@@ -101,7 +101,9 @@ def direction(at: tuple[int, int], dof: int) -> np.ndarray:
     return row
 
 
-def lower(structure: Structure, channels: Sequence[Channel] = (), *, smooth_slots: int = 0, friction_slots: int = 0) -> Plant:
+def lower(
+    structure: Structure, channels: Sequence[Channel] = (), *, smooth_slots: int = 0, friction_slots: int = 0
+) -> Plant:
     """Plant of a structure.
 
     Parameters
@@ -124,13 +126,20 @@ def lower(structure: Structure, channels: Sequence[Channel] = (), *, smooth_slot
             maps.append(MapSlot(term.force_map, jnp.asarray(row)))
         else:
             (friction if isinstance(term, AbstractFriction) else smooth).append(term)
-    sensors = {ForceGain: np.zeros(dof), "force": np.zeros(dof), AccelerationGain: np.zeros(len(channels)), "channel": np.zeros(len(channels))}
+    sensors = {
+        ForceGain: np.zeros(dof),
+        "force": np.zeros(dof),
+        AccelerationGain: np.zeros(len(channels)),
+        "channel": np.zeros(len(channels)),
+    }
     for sensor in structure.sensors:
         if sensor.at[0] == "force":
-            sensors[ForceGain if isinstance(sensor, ForceGain) else "force"][sensor.at[1] - 1] += float(sensor.b if isinstance(sensor, Offset) else sensor.eps)
-        elif sensor.at in channels:
-            sensors["channel" if isinstance(sensor, Offset) else AccelerationGain][list(channels).index(sensor.at)] += float(
+            sensors[ForceGain if isinstance(sensor, ForceGain) else "force"][sensor.at[1] - 1] += float(
                 sensor.b if isinstance(sensor, Offset) else sensor.eps
+            )
+        elif sensor.at in channels:
+            sensors["channel" if isinstance(sensor, Offset) else AccelerationGain][list(channels).index(sensor.at)] += (
+                float(sensor.b if isinstance(sensor, Offset) else sensor.eps)
             )
     return Plant(
         mass=jnp.asarray(np.diag(mass) if mass.ndim == 1 else mass),
@@ -156,7 +165,9 @@ def _slots(terms: list, laws: tuple[type, ...], count: int, dof: int) -> Slots:
     return Slots(jnp.asarray(kind), jnp.asarray(parameters), jnp.asarray(directions), laws)
 
 
-def smooth_force(plant: Plant, x: Float[Array, " dof"], v: Float[Array, " dof"], t: Float[Array, ""]) -> Float[Array, " dof"]:
+def smooth_force(
+    plant: Plant, x: Float[Array, " dof"], v: Float[Array, " dof"], t: Float[Array, ""]
+) -> Float[Array, " dof"]:
     """Everything on the left-hand side but inertia and friction."""
     total = jnp.sum(plant.stiffness * x[None, :], 1) + jnp.sum(plant.damping * v[None, :], 1)
     slots = plant.smooth

@@ -3,7 +3,6 @@
 import diffrax
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 
 from ._grid import Fine, true_force
 from ._plant import Plant, smooth_force

@@ -135,9 +135,11 @@ def simulate(
 
 
 def with_tables(model: Structure) -> Structure:
-    """The structure with every map frozen to a table: a map looked up in every step would cost a thousand times more."""
+    """The structure with every map frozen to a table: looked up in every step a map would cost a thousand times more."""
     terms = [
-        tabulate(t.force_map).on(t.at) if isinstance(t, MapTerm) and isinstance(t.force_map, AbstractForceStateMap) else t
+        tabulate(t.force_map).on(t.at)
+        if isinstance(t, MapTerm) and isinstance(t.force_map, AbstractForceStateMap)
+        else t
         for t in model.terms
     ]
     return Structure(model.mass, terms, model.sensors, model.trust)
@@ -149,7 +151,10 @@ def check_pair(model: Structure, record: Record) -> None:
         raise ValueError(f"`record` names degree of freedom {record.dofs}; the structure has {model.dof}.")
     masses = np.asarray(model.mass)
     if masses.ndim == 1 and np.any(masses == 0):
-        raise ValueError(f"`mass` must be positive for the structure to move; got {masses.tolist()}. A mass of 0 is for imposed motion only.")
+        raise ValueError(
+            f"`mass` must be positive for the structure to move; got {masses.tolist()}. "
+            "A mass of 0 is for imposed motion only."
+        )
     if len(record) < 2:
         raise ValueError(f"`record` must hold at least 2 samples; it has {len(record)}.")
 

@@ -20,7 +20,12 @@ _ITERATIONS = 12
 
 
 def starting_state(
-    model: Structure, record: Record, initial_state: Any = None, *, window: int = 50, reconstruction: Reconstruction = "band-limited"
+    model: Structure,
+    record: Record,
+    initial_state: Any = None,
+    *,
+    window: int = 50,
+    reconstruction: Reconstruction = "band-limited",
 ) -> tuple[np.ndarray, np.ndarray]:
     """Displacement and velocity (dof,) at the first sample.
 
@@ -33,12 +38,16 @@ def starting_state(
         try:
             x0, v0 = initial_state
         except (TypeError, ValueError):
-            raise ValueError(f"`initial_state` must be a pair (displacement, velocity); got {initial_state!r}.") from None
+            raise ValueError(
+                f"`initial_state` must be a pair (displacement, velocity); got {initial_state!r}."
+            ) from None
         pair = []
         for name, value in (("displacement", x0), ("velocity", v0)):
             array = np.atleast_1d(as_array(value, f"initial_state {name}", (0, 1)))
             if array.shape != (dof,):
-                raise ValueError(f"`initial_state` {name} must have one value per degree of freedom ({dof}); got {array.size}.")
+                raise ValueError(
+                    f"`initial_state` {name} must have one value per degree of freedom ({dof}); got {array.size}."
+                )
             pair.append(array)
         return pair[0], pair[1]
     if record.at_rest or not record.responses:

@@ -83,7 +83,7 @@ def acceleration(plant: Plant, minv, x, v, mode, g, t):
 
 
 def mode_at(plant: Plant, minv, x, v, g, t):
-    """Mode of each friction slot for a given state: the sign of its speed; at rest, whether it sticks or which way it goes."""
+    """Mode of each friction slot in a state: the sign of its speed; at rest, whether it sticks or which way it goes."""
     if not len(plant.friction):
         return jnp.zeros(0)
     speed = jnp.sum(plant.friction.direction * v[None, :], 1)

@@ -18,7 +18,6 @@ from ..dynamics._plant import Plant, Readout, friction_limits, smooth_force
 from ..dynamics._stepper import Motion, acceleration, holding_force, inverse_mass, mode_at
 
 
-
 class Readings(eqx.Module):
     """What a filter sees of a record.
 
@@ -33,7 +32,7 @@ class Readings(eqx.Module):
 
 
 class ProcessNoise(eqx.Module):
-    """What disturbs the motion: white noise of the force samples [N²] (dof,), and of the acceleration [(m/s²)² s] (dof,)."""
+    """What disturbs the motion, each (dof,): white noise of the force samples [N²], of the acceleration [(m/s²)² s]."""
 
     force_variance: Float[Array, " dof"]
     acceleration_density: Float[Array, " dof"]
@@ -59,7 +58,9 @@ def _product(a, b):
     return jnp.sum(a[:, :, None] * b[None, :, :], 1)
 
 
-def innovations(plant: Plant, show: Readout, fine: Fine, readings: Readings, noise: ProcessNoise, start: Start, log_scale) -> Innovations:
+def innovations(
+    plant: Plant, show: Readout, fine: Fine, readings: Readings, noise: ProcessNoise, start: Start, log_scale
+) -> Innovations:
     """Innovations of one filter run.
 
     `log_scale` (channels,) is the logarithm of the factor on each channel's noise variance. A sample with ``use = 0``
@@ -77,7 +78,9 @@ def innovations(plant: Plant, show: Readout, fine: Fine, readings: Readings, noi
         motion, covariance = carry
         force, base, time, y, use, valid = inputs
         g = true_force(plant, force, base)
-        mean, updated, error, spread = _update(plant, minv, show, motion, covariance, g[0], base[0], time, y, use, variances)
+        mean, updated, error, spread = _update(
+            plant, minv, show, motion, covariance, g[0], base[0], time, y, use, variances
+        )
         motion = Motion(mean[:dof], mean[dof:], _mode(plant, minv, motion, mean, g[0], time))
         after = advance_sample(plant, minv, motion, g, time, dt)
         step = _transition(plant, minv, motion, after, time, dt)
@@ -111,7 +114,9 @@ def _transition(plant, minv, before: Motion, after: Motion, time, dt):
 def _force_slopes(plant, x, v, t):
     dof = plant.dof
     basis = jnp.eye(2 * dof)
-    columns = jax.vmap(lambda e: jax.jvp(lambda x, v: smooth_force(plant, x, v, t), (x, v), (e[:dof], e[dof:]))[1])(basis)
+    columns = jax.vmap(lambda e: jax.jvp(lambda x, v: smooth_force(plant, x, v, t), (x, v), (e[:dof], e[dof:]))[1])(
+        basis
+    )
     return columns[:dof].T, columns[dof:].T
 
 
@@ -131,12 +136,13 @@ def _settle(plant, minv, covariance, mode):
 
 def _update(plant, minv, show, motion, covariance, g, base, time, y, use, variances):
     """State after the readings of one sample, and their innovations."""
-    dof = plant.dof
     mean = jnp.concatenate([motion.x, motion.v])
     errors, spreads = [], []
     for c in range(y.shape[0]):
         gain = 1.0 + plant.channel_gain[c]
-        predicted, row = _predict(plant, minv, show, c, mean, covariance, motion.mode, g, base, time, y[c], variances[c], gain)
+        predicted, row = _predict(
+            plant, minv, show, c, mean, covariance, motion.mode, g, base, time, y[c], variances[c], gain
+        )
         error = y[c] - gain * predicted - plant.channel_offset[c]
         row = gain * row
         cross = jnp.sum(covariance * row[None, :], 1)

@@ -107,13 +107,21 @@ def _model(plant: Plant, show: Readout, dt, tau, amplitude, force_variance, omeg
     noise = np.zeros((n, n))
     noise[dof : 2 * dof, dof : 2 * dof] = minv @ np.diag(force_variance * dt**2) @ minv.T
     noise[2 * dof :, 2 * dof :] = np.diag((amplitude * mass) ** 2 * -np.expm1(-2 * dt / tau))
-    row = {"displacement": np.hstack([eye, zero, zero]), "velocity": np.hstack([zero, eye, zero]), "acceleration": rate[dof : 2 * dof]}
+    row = {
+        "displacement": np.hstack([eye, zero, zero]),
+        "velocity": np.hstack([zero, eye, zero]),
+        "acceleration": rate[dof : 2 * dof],
+    }
     select = np.asarray(show.select)
     rows = np.array([s @ row[kind] for kind, s in zip(show.kinds, select, strict=True)])
-    through = np.array([s @ minv if kind == "acceleration" else 0 * s for kind, s in zip(show.kinds, select, strict=True)])
+    through = np.array(
+        [s @ minv if kind == "acceleration" else 0 * s for kind, s in zip(show.kinds, select, strict=True)]
+    )
     sizes = np.concatenate([np.full(dof, length), np.full(dof, length * omega), amplitude * mass])
     start = np.diag((_WIDE * sizes) ** 2)
-    return _Model(*(jnp.asarray(a) for a in (exponential[:n, :n], np.stack([whole - ramp, ramp]), noise, rows, through, start)))
+    return _Model(
+        *(jnp.asarray(a) for a in (exponential[:n, :n], np.stack([whole - ramp, ramp]), noise, rows, through, start))
+    )
 
 
 def _filter(model: _Model, force, values, use, variance):

@@ -1,11 +1,15 @@
 """What values: the likelihood, what is known beforehand, and the fit."""
 
+from ._fit import Fit as Fit
+from ._fit import fit as fit
+from ._fit import without_small_offsets as without_small_offsets
 from ._maximise import Maximum as Maximum
 from ._maximise import approach as approach
 from ._maximise import finish as finish
 from ._maximise import maximise as maximise
 from ._nuisances import Nuisances as Nuisances
 from ._nuisances import prepare as prepare
+from ._posterior import LANES as LANES
 from ._posterior import Hypothesis as Hypothesis
 from ._posterior import Posterior as Posterior
 from ._unknowns import Unknown as Unknown
@@ -15,6 +19,3 @@ from ._unknowns import natural_size as natural_size
 from ._unknowns import nuisance_unknowns as nuisance_unknowns
 from ._unknowns import own_unknown as own_unknown
 from ._unknowns import with_offsets as with_offsets
-from ._fit import Fit as Fit
-from ._fit import fit as fit
-from ._fit import without_small_offsets as without_small_offsets

@@ -122,16 +122,24 @@ def free_paths(model: Structure, records: Sequence[Nuisances], fixed: Sequence[s
     for name in [fixed] if isinstance(fixed, str) else fixed:
         paths = model.select(name)
         if not paths:
-            raise ValueError(f"`fixed` names {name!r}, which the structure does not have; it has {', '.join(model.values())}.")
+            raise ValueError(
+                f"`fixed` names {name!r}, which the structure does not have; it has {', '.join(model.values())}."
+            )
         held.update(paths)
     if not any(n.fine.force.any() or n.fine.base.any() for n in records):
         held.update(model.select("mass"))
     return tuple(p for p in model.entries() if p not in held and not p.startswith("offset@"))
 
 
-def without_small_offsets(structure: Structure, unknowns: Sequence[Unknown], theta: np.ndarray, error: np.ndarray) -> Structure:
+def without_small_offsets(
+    structure: Structure, unknowns: Sequence[Unknown], theta: np.ndarray, error: np.ndarray
+) -> Structure:
     """The structure without the offsets that are not three standard errors from nothing."""
-    small = {u.path for u, t, s in zip(unknowns, theta, error, strict=True) if u.path.startswith("offset@") and abs(t) < 3 * s}
+    small = {
+        u.path
+        for u, t, s in zip(unknowns, theta, error, strict=True)
+        if u.path.startswith("offset@") and abs(t) < 3 * s
+    }
     kept = [s for s in structure.sensors if f"{s.kind}@{s.place}.b" not in small]
     return Structure(structure.mass, structure.terms, kept, structure.trust)
 
@@ -144,14 +152,18 @@ def _bounded(unknowns: list[Unknown], bounds: Mapping[str, tuple[float, float]],
     for name, (low, high) in bounds.items():
         paths = model.select(name)
         if not paths:
-            raise ValueError(f"`bounds` names {name!r}, which the structure does not have; it has {', '.join(model.values())}.")
+            raise ValueError(
+                f"`bounds` names {name!r}, which the structure does not have; it has {', '.join(model.values())}."
+            )
         if not low < high:
             raise ValueError(f"`bounds` of {name!r} must be (low, high) with low < high; got ({low}, {high}).")
         unknowns = [bounded(u, low, high) if u.path in paths else u for u in unknowns]
     return unknowns
 
 
-def _words(unknowns: Sequence[Unknown], theta, error, pairs: Mapping[tuple[str, str], float], structure: Structure) -> tuple[str, ...]:
+def _words(
+    unknowns: Sequence[Unknown], theta, error, pairs: Mapping[tuple[str, str], float], structure: Structure
+) -> tuple[str, ...]:
     """What the records cannot tell."""
     words = []
     for (a, b), r in pairs.items():

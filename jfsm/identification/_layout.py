@@ -38,7 +38,9 @@ def with_vector(plant: Plant, vector: Float[Array, " size"]) -> Plant:
     return Plant(**parts, smooth=slots[0], friction=slots[1], maps=plant.maps)
 
 
-def plant_rows(structure: Structure, paths: Sequence[str], channels: Sequence[Channel], **slots: int) -> Float[np.ndarray, "paths size"]:
+def plant_rows(
+    structure: Structure, paths: Sequence[str], channels: Sequence[Channel], **slots: int
+) -> Float[np.ndarray, "paths size"]:
     """Derivative of the plant's vector by each of the structure's numbers `paths`.
 
     The plant is linear in each, so doubling a number shows it exactly.

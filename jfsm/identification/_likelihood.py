@@ -25,7 +25,7 @@ _START_VARIANCE = 1e-12
 
 
 class Lanes(eqx.Module):
-    """Parameter maps of several starts: numbers = base + rows·value(theta), first the plant's, then x0, v0, log scales."""
+    """Parameter maps of several starts: base + rows·value(theta), the plant's numbers, then x0, v0, log scales."""
 
     base: Float[Array, "lanes size"]
     rows: Float[Array, "lanes unknowns size"]
@@ -33,7 +33,9 @@ class Lanes(eqx.Module):
     log: Float[Array, "lanes unknowns"]
 
 
-def _run(plant: Plant, lane, theta, show: Readout, fine: Fine, readings: Readings, noise: ProcessNoise, size) -> Innovations:
+def _run(
+    plant: Plant, lane, theta, show: Readout, fine: Fine, readings: Readings, noise: ProcessNoise, size
+) -> Innovations:
     base, rows, unit, log = lane
     value = unit * jnp.where(log > 0, jnp.exp(jnp.where(log > 0, theta, 0.0)), theta)
     numbers = base + jnp.sum(rows * value[:, None], 0)
@@ -68,7 +70,10 @@ def derivatives(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, 
         e, de, ds = error * deviation, by_error * deviation, by_variance * jnp.sqrt(counted)
         value = 0.5 * jnp.sum(e**2 + counted * (log_variance + jnp.log(2 * jnp.pi)))
         flat = lambda array: array.reshape(array.shape[0], -1)  # noqa: E731
-        gradient = flat(de) @ e.ravel() + 0.5 * flat(ds) @ (jnp.sqrt(counted) - e**2 / jnp.maximum(jnp.sqrt(counted), 1e-30)).ravel()
+        gradient = (
+            flat(de) @ e.ravel()
+            + 0.5 * flat(ds) @ (jnp.sqrt(counted) - e**2 / jnp.maximum(jnp.sqrt(counted), 1e-30)).ravel()
+        )
         return value, gradient, flat(de) @ flat(de).T + 0.5 * flat(ds) @ flat(ds).T
 
     mapped = jax.vmap(one, in_axes=(_axes(plant), 0, 0, 0, 0, 0))
@@ -82,4 +87,6 @@ def predictions(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, 
     def one(plant, base, rows, unit, log, theta):
         return _run(plant, (base, rows, unit, log), theta, show, fine, readings, noise, size)
 
-    return jax.vmap(one, in_axes=(_axes(plant), 0, 0, 0, 0, 0))(plant, lanes.base, lanes.rows, lanes.unit, lanes.log, theta)
+    return jax.vmap(one, in_axes=(_axes(plant), 0, 0, 0, 0, 0))(
+        plant, lanes.base, lanes.rows, lanes.unit, lanes.log, theta
+    )

@@ -11,7 +11,7 @@ from ._posterior import Posterior
 LADDER = (1.0, 0.3, 0.1, 0.03, 0.01)
 """Shares of unmodelled force that the first rungs forgive: the top ones compare forces and have wide basins."""
 _LAST_RUNG = 0.003
-_RUNG_STEPS, _RUNG_ENOUGH = 4, 0.5
+_RUNG_STEPS, _RUNG_ENOUGH = 3, 0.5
 _ENOUGH = 0.01
 """A step that promises less than this many nats is the last,"""
 _HOPELESS = 0.02
@@ -64,7 +64,9 @@ def maximise(posterior: Posterior) -> Maximum:
     return finish(posterior, approach(posterior))
 
 
-def _climb(posterior: Posterior, theta: np.ndarray, slack: float, steps: int, enough: float, best: float = np.inf) -> Maximum:
+def _climb(
+    posterior: Posterior, theta: np.ndarray, slack: float, steps: int, enough: float, best: float = np.inf
+) -> Maximum:
     unknowns = posterior.hypothesis.unknowns
     low = np.array([[u.low for u in row] for row in unknowns])
     high = np.array([[u.high for u in row] for row in unknowns])
@@ -124,4 +126,8 @@ def _finite(outcome):
     value, gradient, information = outcome
     bad = ~(np.isfinite(value) & np.all(np.isfinite(gradient), 1) & np.all(np.isfinite(information), (1, 2)))
     value = np.where(bad, np.inf, value)
-    return value, np.where(bad[:, None], 0.0, gradient), np.where(bad[:, None, None], np.eye(gradient.shape[1]), information)
+    return (
+        value,
+        np.where(bad[:, None], 0.0, gradient),
+        np.where(bad[:, None, None], np.eye(gradient.shape[1]), information),
+    )

@@ -84,7 +84,9 @@ def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "
     """
     check_pair(model, record)
     if not record.responses:
-        raise ValueError("`record` must hold a response (displacement, velocity or acceleration); it has none to compare with.")
+        raise ValueError(
+            "`record` must hold a response (displacement, velocity or acceleration); it has none to compare with."
+        )
     if len(record) < 32:
         raise ValueError(f"`record` must hold at least 32 samples to tell noise from motion; it has {len(record)}.")
     dt, dof = record.dt, model.dof
@@ -100,7 +102,9 @@ def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "
     for i, (kind, j) in enumerate(channels):
         floor = noise_floor(values[:, i], dt)
         trusted.append(floor.spacing > FINEST)
-        floors.append(max(floor.std if trusted[-1] else min(floor.std, _BAND_LIMITED * spread[i]), _LEAST_NOISE * spread[i]))
+        floors.append(
+            max(floor.std if trusted[-1] else min(floor.std, _BAND_LIMITED * spread[i]), _LEAST_NOISE * spread[i])
+        )
         lost = clipped(values[:, i]) | spikes(values[:, i], floors[-1])
         if np.any(lost):
             use[lost, i] = 0.0
@@ -162,7 +166,9 @@ def _force(record: Record, dof: int) -> tuple[np.ndarray, np.ndarray, float, lis
                 notes.append(f"force {j} holds nothing but noise and counts as zero.")
             continue
         if np.any(clipped(samples)):
-            notes.append(f"force {j} looks clipped; its true peaks are not known, which shows as an unexplained effect.")
+            notes.append(
+                f"force {j} looks clipped; its true peaks are not known, which shows as an unexplained effect."
+            )
         floor = noise_floor(samples, record.dt)
         if floor.spacing >= _OVERSAMPLED:
             force[:, j - 1] = floor.smooth

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
@@ -18,7 +18,7 @@ from ._unknowns import DEGREES, Unknown
 
 LANES = 2
 """Starts that run side by side where nothing sticks; a single one is doubled, so that one program serves all."""
-_WIDTHS = (8, 12, 16, 20, 24, 32, 48, 64, 96, 128)
+_WIDTHS = (12, 16, 20, 24, 32, 48, 64, 96, 128)
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,17 @@ class Posterior:
             inner[:, : len(mine)] = theta[self._pick][:, mine]
             scale = jnp.asarray(np.repeat([nuisances.length, nuisances.length * nuisances.omega], plant.mass.shape[-1]))
             fine, readings = nuisances.head(until)
-            out = derivatives(plant, maps, jnp.asarray(inner), nuisances.show, fine, readings, slackened(nuisances, slack), scale, until)
+            out = derivatives(
+                plant,
+                maps,
+                jnp.asarray(inner),
+                nuisances.show,
+                fine,
+                readings,
+                slackened(nuisances, slack),
+                scale,
+                until,
+            )
             v, g, f = (np.asarray(o)[:lanes] for o in out)
             value += v
             gradient[:, mine] += g[:, : len(mine)]
@@ -84,15 +94,27 @@ class Posterior:
         return value, gradient, information
 
     def innovations(
-        self, theta: np.ndarray, index: int = 0, *, use: np.ndarray | None = None, noise_scales: bool = True, slack: float = 0.0
+        self,
+        theta: np.ndarray,
+        index: int = 0,
+        *,
+        use: np.ndarray | None = None,
+        noise_scales: bool = True,
+        slack: float = 0.0,
     ) -> Innovations:
         """Innovations of record `index` at `theta` (unknowns,) of a hypothesis with one start.
 
-        `use` (n, channels) masks readings, `slack` forgives unmodelled force as in `evaluate`. Without `noise_scales` the channels' noise is taken at its floor.
+        `use` (n, channels) masks readings, `slack` forgives unmodelled force as in `evaluate`. Without `noise_scales`
+        the channels' noise is taken at its floor.
         """
         nuisances, (plant, maps, mine) = self.records[index], self._parts[index]
         inner = np.zeros((len(self._pick), maps.unit.shape[1]))
-        chosen = np.array([0.0 if u.path.startswith("noise@") and not noise_scales else t for u, t in zip(self.hypothesis.unknowns[0], theta, strict=True)])
+        chosen = np.array(
+            [
+                0.0 if u.path.startswith("noise@") and not noise_scales else t
+                for u, t in zip(self.hypothesis.unknowns[0], theta, strict=True)
+            ]
+        )
         inner[:, : len(mine)] = chosen[mine]
         readings = nuisances.readings
         if use is not None:
@@ -100,7 +122,16 @@ class Posterior:
             padded[: len(use)] = use
             readings = replace_use(readings, padded)
         scale = jnp.asarray(np.repeat([nuisances.length, nuisances.length * nuisances.omega], plant.mass.shape[-1]))
-        found = predictions(plant, maps, jnp.asarray(inner), nuisances.show, nuisances.fine, readings, slackened(nuisances, slack), scale)
+        found = predictions(
+            plant,
+            maps,
+            jnp.asarray(inner),
+            nuisances.show,
+            nuisances.fine,
+            readings,
+            slackened(nuisances, slack),
+            scale,
+        )
         n = nuisances.samples
         return Innovations(np.asarray(found.error)[0, :n], np.asarray(found.variance)[0, :n])  # pyright: ignore[reportArgumentType]
 
@@ -122,15 +153,23 @@ class Posterior:
         for lane in set(self._pick):
             mine_of = [self.hypothesis.unknowns[lane][k] for k in mine]
             structure = self.hypothesis.structures[lane]
-            packed[lane] = _lane(structure, mine_of, nuisances, plant_vector(lower(structure, nuisances.channels, **slots)), width, slots)
+            packed[lane] = _lane(
+                structure, mine_of, nuisances, plant_vector(lower(structure, nuisances.channels, **slots)), width, slots
+            )
         base, rows, unit, log = (jnp.asarray(np.stack([packed[lane][i] for lane in self._pick])) for i in range(4))
-        stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves) if jnp.issubdtype(leaves[0].dtype, jnp.floating) else leaves[0], *plants)
+        stacked = jax.tree.map(
+            lambda *leaves: jnp.stack(leaves) if jnp.issubdtype(leaves[0].dtype, jnp.floating) else leaves[0], *plants
+        )
         return stacked, Lanes(base, rows, unit, log), mine
 
 
 def _lane(structure, unknowns, nuisances: Nuisances, vector, width, slots):
     dof, channels = structure.dof, len(nuisances.channels)
-    tail = {f"x0@{j + 1}": j for j in range(dof)} | {f"v0@{j + 1}": dof + j for j in range(dof)} | {f"noise@{c}": 2 * dof + c for c in range(channels)}
+    tail = (
+        {f"x0@{j + 1}": j for j in range(dof)}
+        | {f"v0@{j + 1}": dof + j for j in range(dof)}
+        | {f"noise@{c}": 2 * dof + c for c in range(channels)}
+    )
     size = vector.size + 2 * dof + channels
     base, rows = np.zeros(size), np.zeros((width, size))
     unit, log = np.zeros(width), np.zeros(width)

@@ -10,7 +10,7 @@ from ..structures import Offset, Structure
 from ._nuisances import Nuisances
 
 TRUST = {"stiffness": 0.02, "damping": 0.25, "mass": 0.01}
-"""How far a model's own values are off as a rule, where its owner does not say: masses are weighed, damping is guessed."""
+"""How far own values are off as a rule, where the owner does not say: masses are weighed, damping is guessed."""
 DEGREES = 1.5
 """Degrees of freedom of Student's law for own values: right to some per cent as a rule, but far off when wrong."""
 TYPICAL, TYPICAL_SPREAD = 0.15, 1.5
@@ -62,7 +62,9 @@ def own_unknown(structure: Structure, path: str, trust: Mapping[str, float]) -> 
     kind = path.split("@")[0]
     width = next((w for name, w in trust.items() if path in structure.select(name)), TRUST.get(kind, 0.25))
     if value == 0:  # nothing to be relative to: damping stated as none
-        raise ValueError(f"{path} is 0 and cannot be refitted as a share of itself; state a small value, or leave the term out.")
+        raise ValueError(
+            f"{path} is 0 and cannot be refitted as a share of itself; state a small value, or leave the term out."
+        )
     return Unknown(path, 0.0, value, True, 0.0, math.log1p(width), heavy=True)
 
 
@@ -95,7 +97,11 @@ def with_offsets(structure: Structure, records: Sequence[Nuisances]) -> Structur
 
 
 def _offset_channels(nuisances: Nuisances) -> list[tuple[str, int]]:
-    forces = [c for c in nuisances.record.channels if c[0] == "force" and np.any(np.asarray(nuisances.fine.force)[:, 0, c[1] - 1])]
+    forces = [
+        c
+        for c in nuisances.record.channels
+        if c[0] == "force" and np.any(np.asarray(nuisances.fine.force)[:, 0, c[1] - 1])
+    ]
     return [*forces, *nuisances.channels]
 
 
@@ -109,7 +115,10 @@ def nuisance_unknowns(structure: Structure, nuisances: Nuisances, index: int) ->
         path = f"offset@{kind}-{j}.b"
         found.append(Unknown(path, values[path] / unit, unit, False, 0.0, 1.0, record=index))
     if not nuisances.at_rest:
-        for name, guess, unit in (("x0", nuisances.x0, nuisances.length), ("v0", nuisances.v0, nuisances.length * nuisances.omega)):
+        for name, guess, unit in (
+            ("x0", nuisances.x0, nuisances.length),
+            ("v0", nuisances.v0, nuisances.length * nuisances.omega),
+        ):
             for j, value in enumerate(guess):
                 found.append(Unknown(f"{name}@{j + 1}", value / unit, unit, False, value / unit, 1.0, record=index))
     for c in range(len(nuisances.channels)):

@@ -43,7 +43,9 @@ class Cause(NamedTuple):
             raise TypeError(f"{self.id} takes {', '.join(names)}; got {', '.join(parameters) or 'nothing'}.")
         first = parameters[names[0]]
         if self.sign and math.copysign(1, first) != self.sign:
-            raise ValueError(f"`{names[0]}` of {self.id} must be {'positive' if self.sign > 0 else 'negative'}; got {first}.")
+            raise ValueError(
+                f"`{names[0]}` of {self.id} must be {'positive' if self.sign > 0 else 'negative'}; got {first}."
+            )
         return self.effect(**parameters, at=at)  # pyright: ignore[reportCallIssue]
 
     def apply(self, model: Structure, at: tuple, **parameters: float) -> Structure:
@@ -52,13 +54,31 @@ class Cause(NamedTuple):
 
 
 _CAUSES = (
-    Cause("cubic_hardening", "stiffness", "cubic hardening spring", CubicStiffness, 1, "the spring grows stiffer with the cube of the displacement"),
-    Cause("cubic_softening", "stiffness", "cubic softening spring", CubicStiffness, -1, "the spring grows softer with the cube of the displacement"),
-    Cause("quadratic_stiffness", "stiffness", "quadratic spring", QuadraticStiffness, 0, "the spring is stiffer to one side than to the other"),
+    Cause(
+        "cubic_hardening", "stiffness", "a cubic hardening spring", CubicStiffness, 1,
+        "the spring grows stiffer with the square of the displacement",
+    ),
+    Cause(
+        "cubic_softening", "stiffness", "a cubic softening spring", CubicStiffness, -1,
+        "the spring grows softer with the square of the displacement",
+    ),
+    Cause(
+        "quadratic_stiffness", "stiffness", "a quadratic spring", QuadraticStiffness, 0,
+        "the spring is stiffer to one side than to the other",
+    ),
     Cause("coulomb", "damping", "Coulomb friction", Coulomb, 1, "dry friction of constant size, which sticks"),
-    Cause("quadratic_damping", "damping", "quadratic damping", QuadraticDamping, 1, "a drag that grows with the square of the velocity"),
-    Cause("force_gain", "sensor", "gain error of the force sensor", ForceGain, 0, "the force sensor reads too much or too little by a fixed share"),
-    Cause("accel_gain", "sensor", "gain error of the accelerometer", AccelerationGain, 0, "the accelerometer reads too much or too little by a fixed share"),
+    Cause(
+        "quadratic_damping", "damping", "quadratic damping", QuadraticDamping, 1,
+        "a drag that grows with the square of the velocity",
+    ),
+    Cause(
+        "force_gain", "sensor", "the gain error of the force sensor", ForceGain, 0,
+        "it reads too much or too little by a fixed share",
+    ),
+    Cause(
+        "accel_gain", "sensor", "the gain error of the accelerometer", AccelerationGain, 0,
+        "it reads too much or too little by a fixed share",
+    ),
 )  # fmt: skip
 
 PARAMETER_CAUSES = {"stiffness": "stiffness_value", "damping": "damping_value", "mass": "mass_value"}

@@ -7,7 +7,6 @@ import equinox as eqx
 from .._types import as_scalar
 from ._term import Parameter, Scalar
 
-
 CHANNEL_KINDS = ("force", "displacement", "velocity", "acceleration")
 
 
@@ -17,7 +16,9 @@ def as_channel(at: Any) -> tuple[str, int]:
         kind, dof = at
         return str(kind), int(dof)
     except (TypeError, ValueError):
-        raise ValueError(f"`at` of a sensor effect must be (kind, degree of freedom), e.g. ('force', 1); got {at!r}.") from None
+        raise ValueError(
+            f"`at` of a sensor effect must be (kind, degree of freedom), e.g. ('force', 1); got {at!r}."
+        ) from None
 
 
 class AbstractSensor(eqx.Module):
@@ -36,7 +37,9 @@ class AbstractSensor(eqx.Module):
     def __check_init__(self):
         allowed = CHANNEL_KINDS if self.channel == "any" else (self.channel,)
         if self.at[0] not in allowed or self.at[1] < 1:
-            raise ValueError(f"`at` of {self.kind} must be ({' or '.join(allowed)}, degree of freedom from 1); got {self.at!r}.")
+            raise ValueError(
+                f"`at` of {self.kind} must be ({' or '.join(allowed)}, degree of freedom from 1); got {self.at!r}."
+            )
 
 
 class ForceGain(AbstractSensor):

@@ -59,12 +59,18 @@ class Structure(eqx.Module):
             if not isinstance(term, AbstractTerm):
                 raise TypeError(f"`terms` must hold terms such as jfsm.LinearStiffness(9.0, at=(0, 1)); got {term!r}.")
             if max(term.at) > self.dof:
-                raise ValueError(f"`at`={term.at} of {term.kind} names a degree of freedom beyond the {self.dof} of the structure.")
+                raise ValueError(
+                    f"`at`={term.at} of {term.kind} names a degree of freedom beyond the structure's {self.dof}."
+                )
         for sensor in self.sensors:
             if not isinstance(sensor, AbstractSensor):
-                raise TypeError(f"`sensors` must hold sensor effects such as jfsm.ForceGain(0.1, at=('force', 1)); got {sensor!r}.")
+                raise TypeError(
+                    f"`sensors` must hold sensor effects such as jfsm.ForceGain(0.1, at=('force', 1)); got {sensor!r}."
+                )
             if sensor.at[1] > self.dof:
-                raise ValueError(f"`at`={sensor.at} of {sensor.kind} names a degree of freedom beyond the {self.dof} of the structure.")
+                raise ValueError(
+                    f"`at`={sensor.at} of {sensor.kind} names a degree of freedom beyond the structure's {self.dof}."
+                )
 
     @classmethod
     def sdof(cls, mass: float, stiffness: float, damping: float = 0.0) -> "Structure":
@@ -137,7 +143,9 @@ class Structure(eqx.Module):
         """The same structure with other numbers, by path."""
         unknown = [path for path in values if path not in self.entries()]
         if unknown:
-            raise ValueError(f"{unknown[0]!r} names no parameter of this structure; it has {', '.join(self.entries())}.")
+            raise ValueError(
+                f"{unknown[0]!r} names no parameter of this structure; it has {', '.join(self.entries())}."
+            )
         mass = np.array(self.mass)
         paths = iter(self.entries())
         for i in range(self.dof):

@@ -31,7 +31,9 @@ def save(structure: "Structure", path: str | Path) -> None:
         rows = []
         for part in parts:
             if not part.parameters:
-                raise ValueError(f"A structure with a {part.kind} cannot be written as TOML; keep the record and fit the map again.")
+                raise ValueError(
+                    f"A structure with a {part.kind} cannot be written as TOML; keep the record and fit the map again."
+                )
             numbers = {p.name: float(getattr(part, p.name)) for p in part.parameters}
             rows.append({"kind": part.kind, "at": list(part.at), **numbers})
         if rows:

@@ -21,7 +21,9 @@ class Coulomb(AbstractFriction):
         except Exception:
             return
         if negative:
-            raise ValueError(f"`F` of Coulomb friction must not be negative (it would drive the motion); got {float(self.F)}.")
+            raise ValueError(
+                f"`F` of Coulomb friction must not be negative (it would drive the motion); got {float(self.F)}."
+            )
 
     def limits(self, d, w, z, t):
         return -self.F, self.F

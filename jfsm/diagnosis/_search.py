@@ -1,0 +1,102 @@
+"""Every hypothesis fitted: those that share a program side by side, the hopeless ones only so far."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..identification import LANES, Maximum, Nuisances, Posterior, approach, finish
+from ..structures import AbstractFriction, Structure
+from ._candidates import Candidate, hypothesis
+from ._trial import Trial, trial
+
+_LADDER = (0.3, 0.03, 0.01)
+"""Rungs for a candidate: the refit has been at the top already."""
+_FAR_BEHIND = 200.0
+"""Nats behind the leader, one per cent of unmodelled force forgiven, from which a candidate is not pursued."""
+
+
+@dataclass(frozen=True)
+class _Approached:
+    """Starts of one law, brought to the last rung that forgives unmodelled force."""
+
+    candidates: tuple[Candidate, ...]
+    posterior: Posterior
+    rung: Maximum
+
+    @property
+    def best(self) -> float:
+        return float(np.min(self.rung.value))
+
+
+def fit_model(name: str, model: Structure, records: Sequence[Nuisances], until: Sequence[int], *, refit: bool) -> Trial:
+    """The model as given, or with its own values refitted."""
+    posterior = Posterior(hypothesis(model, [model], records, refit=refit), records, until)
+    rung = approach(posterior)
+    return trial(posterior, finish(posterior, rung), 0, None, (name,), float(rung.value[0]))
+
+
+def groups(tried: Sequence[Candidate]) -> list[list[tuple[Candidate, Structure]]]:
+    """Starts that can share a program, in lots of its lanes: one law, whatever its sign and place."""
+    by_law: dict[type, list[tuple[Candidate, Structure]]] = {}
+    for candidate in tried:
+        by_law.setdefault(candidate.cause.effect, []).extend((candidate, s) for s in candidate.starts)
+    lots = []
+    for law, starts in by_law.items():
+        lanes = 1 if issubclass(law, AbstractFriction) else LANES
+        lots += [starts[i : i + lanes] for i in range(0, len(starts), lanes)]
+    return lots
+
+
+def search(
+    tried: Sequence[Candidate],
+    model: Structure,
+    given: Trial,
+    refitted: Trial,
+    records: Sequence[Nuisances],
+    until: Sequence[int],
+    tell: Callable[[str], None],
+) -> list[Trial]:
+    """The best trial of every candidate; those far behind stay at the values of their rung."""
+    approached = []
+    start = refitted.structure if refitted.evidence > given.evidence else model
+    for lot in groups(tried):
+        first = lot[0][0]
+        tell(f"{first.cause.label} at {'-'.join(map(str, first.at))}")
+        approached.append(_approach(lot, model, start, records, until))
+    leader = min([refitted.rung, *(lot.best for lot in approached)])
+    trials, best = [], refitted.value
+    for lot in sorted(approached, key=lambda lot: lot.best):
+        tell("the best candidates")
+        behind = lot.best - leader
+        pursued = behind < _FAR_BEHIND
+        found = finish(lot.posterior, lot.rung, best=best) if pursued else lot.rung
+        for lane, candidate in enumerate(lot.candidates):
+            done = trial(lot.posterior, found, lane, candidate.cause, candidate.at, float(lot.rung.value[lane]))
+            if pursued:
+                best = min(best, done.value)
+            else:
+                done = replace(done, evidence=refitted.evidence - behind, converged=False)
+            trials.append(done)
+    return _best_of_each(trials)
+
+
+def _approach(
+    lot: Sequence[tuple[Candidate, Structure]], model: Structure, start: Structure, records, until
+) -> _Approached:
+    candidates, starts = zip(*lot, strict=True)
+    # A gain lies on a ridge with the own values: only from the values as given does a climb end at its own end of it.
+    sensor = candidates[0].cause.is_sensor
+    own = None if sensor else {p: v for p, v in start.values().items() if p in model.entries()}
+    posterior = Posterior(hypothesis(model, starts, records, begin=own), records, until)
+    return _Approached(candidates, posterior, approach(posterior, _LADDER))
+
+
+def _best_of_each(trials: Sequence[Trial]) -> list[Trial]:
+    """The most probable start of every cause at every place."""
+    best: dict[tuple, Trial] = {}
+    for t in trials:
+        name = (t.name, t.at)
+        if name not in best or t.evidence > best[name].evidence:
+            best[name] = t
+    return list(best.values())
