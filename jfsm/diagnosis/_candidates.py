@@ -61,12 +61,11 @@ def candidates(
 ) -> list[Candidate]:
     """Every cause of `selection` at every place: link laws on the model's links, sensor effects on the channels."""
     found = []
-    driven = any(channel[0] == "force" for n in records for channel in n.record.channels)
     for cause in selection.values():
         if cause.is_sensor:
             kind = cause.effect.channel
             channels = dict.fromkeys(c for n in records for c in n.record.channels if c[0] == kind)
-            if not driven:  # without a force every sensor's scale is free
+            if not _has_scale(kind, records):
                 continue
             spots: list[tuple] = list(channels)
         else:
@@ -74,6 +73,18 @@ def candidates(
         for at in spots:
             found.append(Candidate(cause, tuple(at), _starts(model, cause, at, records[0])))
     return found
+
+
+def _has_scale(kind: str, records: Sequence[Nuisances]) -> bool:
+    """Whether anything but the channels of this kind tells how large they should be."""
+    if kind == "force":
+        return any(driven(n) for n in records)
+    return any(driven(n) or any(c[0] != kind for c in n.channels) for n in records)
+
+
+def driven(nuisances: Nuisances) -> bool:
+    """Whether a measured force or a moving base drives the record."""
+    return bool(nuisances.fine.force.any() or nuisances.fine.base.any())
 
 
 def _starts(model: Structure, cause: Cause, at: tuple, nuisances: Nuisances) -> tuple[Structure, ...]:
@@ -97,9 +108,9 @@ def own_paths(model: Structure, records: Sequence[Nuisances]) -> tuple[str, ...]
 
     Without any force only ratios show, so masses stay as stated. Values of zero have nothing to be relative to.
     """
-    driven = any(n.fine.force.any() or n.fine.base.any() for n in records)
+    scaled = any(driven(n) for n in records)
     values = model.values()
-    return tuple(p for p in model.entries() if values[p] != 0 and (driven or not p.startswith("mass@")))
+    return tuple(p for p in model.entries() if values[p] != 0 and (scaled or not p.startswith("mass@")))
 
 
 def hypothesis(

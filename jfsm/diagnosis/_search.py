@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..dynamics import lower
 from ..identification import LANES, Maximum, Nuisances, Posterior, approach, finish
 from ..structures import AbstractFriction, Structure
 from ._candidates import Candidate, hypothesis
@@ -30,10 +31,18 @@ class _Approached:
 
 
 def fit_model(name: str, model: Structure, records: Sequence[Nuisances], until: Sequence[int], *, refit: bool) -> Trial:
-    """The model as given, or with its own values refitted."""
-    posterior = Posterior(hypothesis(model, [model], records, refit=refit), records, until)
+    """The model as given, or with its own values refitted, the better of two climbs.
+
+    One comes down the ladder, for values that are far off; one begins at the values as given, for a model that lacks
+    something, whose top rungs lead astray.
+    """
+    both = 1 if lower(model).friction.kind.size else LANES
+    posterior = Posterior(hypothesis(model, [model] * both, records, refit=refit), records, until)
     rung = approach(posterior)
-    return trial(posterior, finish(posterior, rung), 0, None, (name,), float(rung.value[0]))
+    theta = np.vstack([rung.theta[:1], posterior.initial()[1:]])
+    found = finish(posterior, replace(rung, theta=theta))
+    best = int(np.argmin(found.value))
+    return trial(posterior, found, best, None, (name,), float(rung.value[0]))
 
 
 def groups(tried: Sequence[Candidate]) -> list[list[tuple[Candidate, Structure]]]:

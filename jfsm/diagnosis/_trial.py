@@ -115,9 +115,9 @@ def whiteness(posterior: Posterior, theta: np.ndarray) -> float:
     worst = 0.0
     for index, nuisances in enumerate(posterior.records):
         found = posterior.innovations(theta, index)
-        r = (found.error / np.sqrt(found.variance))[1 : posterior.until[index]]
-        alive = np.asarray(nuisances.readings.use)[1 : posterior.until[index]] > 0
-        r = np.where(alive, r, 0.0)
+        counted = slice(1, posterior.until[index])
+        alive = (np.asarray(nuisances.readings.use)[counted] > 0) & (found.variance[counted] > 0)
+        r = np.where(alive, found.error[counted] / np.sqrt(np.where(alive, found.variance[counted], 1.0)), 0.0)
         worst = max(worst, float(np.max(np.abs(np.sum(r[1:] * r[:-1], 0) / np.maximum(np.sum(r * r, 0), 1e-300)))))
     return worst
 

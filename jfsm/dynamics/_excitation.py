@@ -14,6 +14,8 @@ from ._plant import lower
 _STEP_ANGLE = 0.22
 """Largest angle of the fastest mode per step [rad]: Runge-Kutta of order four then shifts a frequency by 2e-5."""
 _MOST_SUBSTEPS = 16
+_STABLE_ANGLE = 2.6
+"""Largest angle per step at which Runge-Kutta of order four does not blow up by itself."""
 
 
 def bucket(n: int) -> int:
@@ -32,8 +34,24 @@ def fastest_mode(structure: Structure) -> float:
 
 
 def substeps_for(structure: Structure, dt: float) -> int:
-    """Steps per sample, a power of two, that keep the fastest mode's angle per step small."""
-    need = max(1.0, fastest_mode(structure) * dt / _STEP_ANGLE)
+    """Steps per sample, a power of two, that keep the angle per step of the fastest mode or decay small.
+
+    Raises
+    ------
+    ValueError
+        If the largest number of steps would still be unstable, which would pass for a motion that runs away.
+    """
+    plant = lower(structure)
+    zero, eye = np.zeros((structure.dof, structure.dof)), np.eye(structure.dof)
+    rates = np.linalg.solve(np.asarray(plant.mass), -np.hstack([plant.stiffness, plant.damping]))
+    fastest = float(np.max(np.abs(np.linalg.eigvals(np.vstack([np.hstack([zero, eye]), rates])))))
+    if fastest * dt / _MOST_SUBSTEPS > _STABLE_ANGLE:
+        raise ValueError(
+            f"`model` must move slowly enough for the record's steps of {dt:.6g} s; its fastest mode or decay has "
+            f"{fastest:.6g} rad/s, the record shows at most {math.pi / dt:.6g}. "
+            "Leave that spring, dashpot or small mass out of the model, or use a record of a higher rate."
+        )
+    need = max(1.0, fastest * dt / _STEP_ANGLE)
     return min(_MOST_SUBSTEPS, 2 ** math.ceil(math.log2(need)))
 
 
@@ -68,10 +86,13 @@ def excitation(
     n, factor = len(record), 2 * substeps
     padded = n if length is None else length
     both = np.column_stack([samples, base])
-    fine = reconstruct(np.concatenate([both, both[-1:]]), factor, method)
-    take = np.arange(n)[:, None] * factor + np.arange(factor + 1)
     intervals = np.zeros((padded, factor + 1, dof + 1))
-    intervals[:n] = fine[take]
+    if method == "hold":  # up to the end of its interval: the jump belongs to the next
+        intervals[:n] = both[:, None]
+    else:
+        take = np.arange(n - 1)[:, None] * factor + np.arange(factor + 1)
+        intervals[: n - 1] = reconstruct(both, factor, method)[take]
+        intervals[n - 1] = both[-1]  # leads to no sample
     time = record.time[0] + record.dt * np.arange(padded)
     return Fine(
         jnp.asarray(intervals[..., :dof]), jnp.asarray(intervals[..., dof]), jnp.asarray(time), jnp.asarray(record.dt)

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -11,14 +12,15 @@ import numpy as np
 from .._result import Result
 from .._types import require_x64
 from ..records import Record
-from ..structures import MapTerm, Structure
+from ..structures import AbstractSensor, AccelerationGain, MapTerm, Offset, Structure
 from ..surrogates import AbstractForceStateMap, tabulate
 from ._drive import Reconstruction
 from ._excitation import bucket, excitation, substeps_for
-from ._grid import run_grid
+from ._grid import run_grid, true_force
 from ._plant import Plant, lower
 from ._reference import run_reference
 from ._start import starting_state
+from ._stepper import free_acceleration, inverse_mass
 
 _FRICTION_SUBSTEPS = 4
 """Steps per sample at least where something sticks; the error falls with the fourth power."""
@@ -50,12 +52,16 @@ class Response:
     result: Result
     escape_time: float | None
     _gains: Mapping[tuple[str, int], float]
+    _offsets: Mapping[tuple[str, int], float]
 
     def readings(self, record: Record) -> dict[tuple[str, int], np.ndarray]:
         """What the sensors of `record` would show, by channel (kind, degree of freedom): gains applied."""
-        return {
-            key: getattr(self, key[0])[:, key[1] - 1] * (1.0 + self._gains.get(key, 0.0)) for key in record.responses
-        }
+        found = {}
+        for key in record.responses:
+            offset = self._offsets.get(key, 0.0)  # a gain acts on the motion, the offset comes after it
+            motion = getattr(self, key[0])[:, key[1] - 1] - offset
+            found[key] = (1.0 + self._gains.get(key, 0.0)) * motion + offset
+        return found
 
 
 def simulate(
@@ -119,19 +125,28 @@ def simulate(
     n = len(record) if stop is None else stop
     if record.base_acceleration is not None:
         a = a + record.base_acceleration[:, None]
-    offsets = {s.at: float(s.b) for s in model.sensors if s.kind == "offset"}  # pyright: ignore[reportAttributeAccessIssue]
+    offsets, gains = _totals(model, Offset), _totals(model, AccelerationGain)
     shown = {}
     for kind, values in (("displacement", x), ("velocity", v), ("acceleration", a)):
         shift = np.array([offsets.get((kind, j + 1), 0.0) for j in range(model.dof)])
         shown[kind] = values[:n] + shift
-    gains = {s.at: float(s.eps) for s in model.sensors if s.kind == "accel_gain"}  # pyright: ignore[reportAttributeAccessIssue]
     return Response(
         time=record.time[:n],
         result=Result.successful if stop is None else Result.diverged,
         escape_time=None if stop is None else float(record.time[stop]),
         _gains=gains,
+        _offsets=offsets,
         **shown,
     )
+
+
+def _totals(model: Structure, effect: type[AbstractSensor]) -> dict[tuple[str, int], float]:
+    """Sum of the effects of one kind on each channel."""
+    found: dict[tuple[str, int], float] = {}
+    for sensor in model.sensors:
+        if isinstance(sensor, effect):
+            found[sensor.at] = found.get(sensor.at, 0.0) + float(getattr(sensor, effect.parameters[0].name))
+    return found
 
 
 def with_tables(model: Structure) -> Structure:
@@ -155,15 +170,17 @@ def check_pair(model: Structure, record: Record) -> None:
             f"`mass` must be positive for the structure to move; got {masses.tolist()}. "
             "A mass of 0 is for imposed motion only."
         )
+    if record.drive == "motion":
+        raise ValueError(
+            '`record` has drive="motion"; an imposed motion cannot be simulated yet, only a force or a moving base. '
+            'If the force drives the structure, make the record with drive="force".'
+        )
     if len(record) < 2:
         raise ValueError(f"`record` must hold at least 2 samples; it has {len(record)}.")
 
 
-@jax.jit
+@eqx.filter_jit
 def _accelerations_program(plant, fine, x, v):
-    from ._grid import true_force
-    from ._stepper import free_acceleration, inverse_mass
-
     minv = inverse_mass(plant)
 
     def one(force, base, time, x, v):
@@ -180,9 +197,10 @@ def _accelerations(plant: Plant, fine, x: np.ndarray, v: np.ndarray) -> np.ndarr
 def _escape(plant: Plant, fine, x, v, record: Record, x0, v0) -> int | None:
     """First sample beyond every bound, if any."""
     measured = [np.max(np.abs(y)) for (kind, _), y in record.responses.items() if kind == "displacement"]
-    stiffness = float(jnp.max(jnp.abs(plant.stiffness)))
-    static = float(jnp.max(jnp.abs(fine.force))) / stiffness if stiffness > 0 else 0.0
-    # With nothing else to compare with, the size of the first half of the run has to do.
+    stiffness, mass = float(jnp.max(jnp.abs(plant.stiffness))), float(jnp.max(jnp.abs(plant.mass)))
+    driving = float(jnp.max(jnp.abs(fine.force))) + mass * float(jnp.max(jnp.abs(fine.base)))
+    static = driving / stiffness if stiffness > 0 else driving * record.duration**2 / mass
+    # With nothing else to compare with, the median of the run has to do.
     own = float(np.nanmedian(np.abs(np.where(np.isfinite(x), x, np.nan)))) if np.any(np.isfinite(x)) else 0.0
     bound = _BOUND * max([*measured, static, float(np.max(np.abs(x0))), own, 1e-300])
     bad = ~np.all(np.isfinite(x) & np.isfinite(v) & (np.abs(x) < bound), axis=1)

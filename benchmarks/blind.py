@@ -1,0 +1,186 @@
+"""Examines `jfsm.diagnose` on plants with hidden effects, and counts how often it is right.
+
+    python benchmarks/blind.py --n 100 --seed 1 --jobs 2 --noise 0.001 0.01 --out results.jsonl
+
+One line of JSON per challenge is appended to the file as it is done; the same call goes on where it was stopped.
+"""
+
+import argparse
+import concurrent.futures
+import json
+import multiprocessing
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.blind_table import Row, exact, said, table  # noqa: E402  (needs the line above when run as a script)
+from tests.blind import CAUSES, Challenge, draw  # noqa: E402
+from tests.blind.challenge import CHANNEL_SETS, NOISE_LEVELS  # noqa: E402
+from tests.blind.drives import DRIVES  # noqa: E402
+
+HOLDOUT = 0.3
+ONE_CORE = {
+    "JAX_PLATFORMS": "cpu",
+    "JAX_ENABLE_X64": "1",
+    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1",
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+}
+
+Drawing = dict[str, Any]
+
+
+def examine(seed: int, drawing: Drawing) -> Row:
+    """The challenge of a seed put to the library, as one row; an exception becomes the row's "error"."""
+    challenge = draw(seed, **drawing)
+    row = question(challenge) | {"drawing": drawing}
+    begin = time.perf_counter()
+    try:
+        said_of_it = answer(_diagnose(challenge))
+    except Exception as problem:  # one failed diagnosis must not end the examination; the table lists it
+        words = f"{type(problem).__name__}: {problem}"
+        said_of_it = {"verdict": "failed", "findings": [], "closed": None, "error": words}
+    return row | said_of_it | {"seconds": time.perf_counter() - begin}
+
+
+def question(challenge: Challenge) -> Row:
+    """What was drawn, the truth included."""
+    return {
+        "seed": challenge.seed,
+        "cause": challenge.cause,
+        "at": list(challenge.at),
+        "parameters": challenge.parameters,
+        "noise": challenge.noise,
+        "channel_set": challenge.channel_set,
+        "excitation": challenge.excitation,
+        "at_rest": challenge.at_rest,
+        "share": challenge.share,
+        "left": challenge.left,
+        "damping_ratio": challenge.truth.damping_ratio,
+    }
+
+
+def answer(diagnosis: Any) -> Row:
+    """What a diagnosis says, as plain types."""
+    return {
+        "verdict": diagnosis.verdict,
+        "findings": [
+            {
+                "cause": finding.cause,
+                "at": list(finding.at),
+                "probability": float(finding.probability),
+                "parameters": {
+                    name: {"value": float(e.value), "low": float(e.low), "high": float(e.high)}
+                    for name, e in finding.parameters.items()
+                },
+                "rivals": [
+                    {"cause": rival.cause, "at": list(rival.at), "probability": float(rival.probability)}
+                    for rival in finding.rivals
+                ],
+            }
+            for finding in diagnosis.findings
+        ],
+        "closed": None if diagnosis.gain is None else float(diagnosis.gain.closed),
+        "error": None,
+    }
+
+
+def _diagnose(challenge: Challenge) -> Any:
+    import jax  # only in the workers, whose environment is settled before it is loaded
+
+    import jfsm
+
+    channels: dict[str, Any] = {**challenge.channels, "units": challenge.units}
+    record = jfsm.Record(time=challenge.time, **channels, at_rest=challenge.at_rest)
+    believed = challenge.model
+    model = jfsm.Structure.sdof(mass=believed.mass, stiffness=believed.stiffness, damping=believed.damping)
+    return jfsm.diagnose(record, model, holdout=HOLDOUT, key=jax.random.key(challenge.seed))
+
+
+def earlier_rows(path: Path, drawing: Drawing) -> list[Row]:
+    """Rows that an earlier call left in the file; none if there is no file.
+
+    Raises
+    ------
+    ValueError
+        If the file holds rows that were drawn in another way.
+    """
+    if not path.exists():
+        return []
+    rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
+    for row in rows:
+        if row["drawing"] != drawing:
+            raise ValueError(
+                f"`--out` must name a new file or one of the same drawing; {path} was drawn with {row['drawing']}, "
+                f"this call draws with {drawing}. Give another file, or repeat the earlier arguments."
+            )
+    return rows
+
+
+def answers(seeds: Sequence[int], drawing: Drawing, jobs: int) -> Iterator[Row]:
+    """Rows of these seeds as they are done, from `jobs` processes of one core each."""
+    os.environ.update(ONE_CORE)  # spawned processes inherit it
+    context = multiprocessing.get_context("spawn")
+    pool = concurrent.futures.ProcessPoolExecutor(jobs, mp_context=context)
+    try:
+        waiting = [pool.submit(examine, seed, drawing) for seed in seeds]
+        for future in concurrent.futures.as_completed(waiting):
+            yield future.result()
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def progress_line(row: Row, done: int, total: int, elapsed: float) -> str:
+    """One line for one row: which, the truth, what was said, and the time left."""
+    mark = "ok   " if exact(row) else "WRONG"
+    sure = f" p={row['findings'][0]['probability']:.2f}" if row["findings"] else ""
+    left = elapsed / done * (total - done)
+    return (
+        f"[{done:{len(str(total))}d}/{total}] {mark} seed {row['seed']}: {row['cause']} -> {said(row)}{sure}"
+        f"  {row['seconds']:.1f} s, {left / 60:.1f} min left"
+    )
+
+
+def run(seeds: Sequence[int], drawing: Drawing, jobs: int, out: Path | None, say: Callable[[str], None]) -> list[Row]:
+    """Rows of all seeds: those in the file already, and the others as examined now and appended to it."""
+    rows = [row for row in earlier_rows(out, drawing) if row["seed"] in seeds] if out else []
+    missing = sorted(set(seeds) - {row["seed"] for row in rows})
+    if rows:
+        say(f"{len(rows)} done before, {len(missing)} to do")
+    begin = time.perf_counter()
+    try:
+        for done, row in enumerate(answers(missing, drawing, jobs) if missing else (), start=1):
+            rows.append(row)
+            if out:
+                with out.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(row) + "\n")
+            say(progress_line(row, done, len(missing), time.perf_counter() - begin))
+    except KeyboardInterrupt:
+        say("stopped; what is done is counted below" + (" and kept" if out else ""))
+    return rows
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description="Examines jfsm.diagnose on plants with hidden effects.")
+    parser.add_argument("--n", type=int, default=20, help="challenges")
+    parser.add_argument("--seed", type=int, default=0, help="the first seed; the others follow it")
+    parser.add_argument("--jobs", type=int, default=2, help="processes")
+    parser.add_argument("--noise", type=float, nargs="+", default=list(NOISE_LEVELS), help="shares of a channel's rms")
+    parser.add_argument("--causes", nargs="+", default=list(CAUSES), choices=CAUSES, metavar="ID")
+    parser.add_argument("--channels", nargs="+", default=list(CHANNEL_SETS), choices=list(CHANNEL_SETS))
+    parser.add_argument("--excitation", nargs="+", default=list(DRIVES), choices=list(DRIVES))
+    parser.add_argument("--out", type=Path, help="file of JSON lines to append to and to resume from")
+    given = parser.parse_args(arguments)
+    drawing = {name: getattr(given, name) for name in ("causes", "noise", "channels", "excitation")}
+    rows = run(range(given.seed, given.seed + given.n), drawing, given.jobs, given.out, lambda s: print(s, flush=True))
+    if rows:
+        print("\n" + table(sorted(rows, key=lambda row: row["seed"])))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,9 @@
+"""Plants with one hidden effect each, drawn by seed: what the diagnosis is examined on.
+
+Nothing here knows the library: laws, sensors and the integrator are written a second time on NumPy and SciPy alone, so
+that an error made in the library cannot be made in its examination as well.
+"""
+
+from .challenge import CAUSES as CAUSES
+from .challenge import Challenge as Challenge
+from .challenge import draw as draw

@@ -1,0 +1,209 @@
+"""What the examination counts as right, and how it adds up, on made-up rows."""
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from benchmarks import blind
+from benchmarks.blind_table import Row, Share, confusions, covers, exact, in_class, kind, said, silent, table
+
+
+def finding(
+    cause: str, probability: float = 0.99, rivals: tuple[str, ...] = (), **intervals: tuple[float, float]
+) -> Row:
+    parameters = {
+        name: {"value": 0.5 * (low + high), "low": low, "high": high} for name, (low, high) in intervals.items()
+    }
+    others = [{"cause": rival, "at": [0, 1], "probability": 0.1} for rival in rivals]
+    return {"cause": cause, "at": [0, 1], "probability": probability, "parameters": parameters, "rivals": others}
+
+
+def row(truth: str, verdict: str, *findings: Row, **changes) -> Row:
+    return {
+        "seed": 1, "cause": truth, "at": [0, 1], "parameters": {}, "noise": 0.01, "channel_set": "x",
+        "excitation": "sweep", "at_rest": False, "verdict": verdict, "findings": list(findings), "closed": 1.0,
+        "error": None, "seconds": 2.0,
+    } | changes  # fmt: skip
+
+
+NAMED = row("coulomb", "cause", finding("coulomb"))
+RIVAL = row("coulomb", "cause", finding("quadratic_damping", 0.6, rivals=("coulomb",)))
+SURE_AND_WRONG = row("coulomb", "cause", finding("quadratic_damping", 0.97), seed=7)
+MISSED = row("coulomb", "parameters", finding("damping_value", 0.95))
+VALUE = row("stiffness_value", "parameters", finding("damping_value"), finding("stiffness_value"))
+WRONG_VALUE = row("stiffness_value", "parameters", finding("mass_value"))
+FALSE_ALARM = row("none", "cause", finding("coulomb", 0.7))
+QUIET = row("none", "consistent")
+FAILED = row("coulomb", "failed", error="ValueError: no", closed=None)
+
+
+def test_wilsons_interval_is_the_published_one():
+    # Newcombe, Stat. Med. 17 (1998) 857-872, table I, method 3.
+    assert Share(81, 263).interval() == pytest.approx((0.2553, 0.3662), abs=5e-5)
+    assert Share(0, 20).interval() == pytest.approx((0.0, 0.1611), abs=5e-5)
+    assert Share(1, 29).interval() == pytest.approx((0.0061, 0.1718), abs=5e-5)
+    assert Share(0, 0).interval() == (0.0, 1.0)
+
+
+def test_a_share_reads_with_its_count_and_interval():
+    assert str(Share(81, 263)) == "81 of 263 = 31% (95 %: 26% to 37%)"
+    assert str(Share(0, 0)) == "none drawn"
+
+
+def test_rows_are_of_three_kinds():
+    assert [kind(r) for r in (QUIET, VALUE, NAMED)] == ["none", "parameters", "cause"]
+
+
+def test_a_cause_is_right_only_if_it_is_named_first():
+    assert exact(NAMED)
+    assert not any(exact(r) for r in (RIVAL, SURE_AND_WRONG, MISSED, FAILED))
+    assert not exact(row("coulomb", "cause", finding("quadratic_damping"), finding("coulomb")))
+    assert not exact(row("coulomb", "unnamed")) and not exact(row("coulomb", "cause"))
+
+
+def test_a_wrong_value_is_right_anywhere_among_the_findings_of_that_verdict():
+    assert exact(VALUE)
+    assert not exact(WRONG_VALUE)
+    assert not exact(row("stiffness_value", "cause", finding("stiffness_value")))
+
+
+def test_with_nothing_wrong_only_consistent_and_undecided_are_right():
+    assert exact(QUIET) and exact(row("none", "undecided"))
+    assert not any(exact(row("none", verdict)) for verdict in ("parameters", "cause", "unnamed", "failed"))
+
+
+def test_the_class_is_right_if_the_truth_is_a_rival():
+    assert in_class(NAMED) and in_class(RIVAL)
+    assert not in_class(SURE_AND_WRONG) and not in_class(MISSED) and not in_class(FAILED)
+
+
+def test_silence_is_broken_by_a_cause_by_a_map_and_by_failing():
+    assert all(silent(row("none", verdict)) for verdict in ("consistent", "parameters", "undecided"))
+    assert not any(silent(row("none", verdict)) for verdict in ("cause", "unnamed", "failed"))
+
+
+def test_coverage_counts_the_true_parameters_of_a_rightly_named_finding():
+    truth = {"F": 2.0, "k": 5.0}
+    named = row("coulomb", "cause", finding("coulomb", F=(1.9, 2.1), k=(5.5, 6.0), other=(0.0, 1.0)), parameters=truth)
+    assert covers(named) == {"F": True, "k": False}
+    assert covers(row("coulomb", "cause", finding("quadratic_damping", F=(1.9, 2.1)), parameters=truth)) == {}
+
+
+def test_what_was_said_is_the_first_cause_the_values_or_the_verdict():
+    assert [said(r) for r in (NAMED, VALUE, QUIET)] == ["coulomb", "damping_value+stiffness_value", "consistent"]
+
+
+def test_confusions_are_counted_commonest_first():
+    assert confusions([NAMED, MISSED, RIVAL, SURE_AND_WRONG, QUIET]) == [
+        ("coulomb", "quadratic_damping", 2),
+        ("coulomb", "damping_value", 1),
+    ]
+
+
+def test_the_table_counts_each_row_where_it_belongs():
+    covered = row("coulomb", "cause", finding("coulomb", F=(1.9, 2.1)), parameters={"F": 2.0}, closed=0.5, noise=0.05)
+    rows = [NAMED, covered, RIVAL, SURE_AND_WRONG, MISSED, VALUE, WRONG_VALUE, FALSE_ALARM, QUIET, FAILED]
+    text = table(rows)
+    lines = [" ".join(line.split("(")[0].split()) for line in text.splitlines()]
+    for expected in (
+        "challenges 10",
+        "cause named exactly 2 of 6 = 33%",
+        "cause first or a rival 3 of 6 = 50%",
+        "wrong value named 1 of 2 = 50%",
+        "silent where no law is 3 of 4 = 75%",
+        "with nothing wrong 1 of 2 = 50%",
+        "intervals that cover 1 of 1 = 100%",
+        "right where p > 0.9 3 of 6 = 50%",
+        "closed share, median 1",
+        "seconds, median 2",
+        "2 x coulomb -> quadratic_damping",
+        "0.05 1 of 1 = 100%",
+        "seed 1: coulomb: ValueError: no",
+    ):
+        assert expected in lines
+    sure = text[text.index("wrong with p > 0.9") : text.index("no answer")]
+    assert "seed 7: coulomb -> quadratic_damping, p = 0.970, sweep, x, noise 0.01" in sure
+    assert sure.count("seed") == 3
+
+
+def test_a_table_of_nothing_but_failures_still_prints():
+    assert "seconds, median none" in " ".join(table([FAILED]).split())
+
+
+def diagnosis(gain: SimpleNamespace | None) -> SimpleNamespace:
+    estimate = SimpleNamespace(value=2.0, low=1.9, high=2.1, unit="N")
+    rival = SimpleNamespace(cause="quadratic_damping", at=(0, 1), probability=0.04)
+    found = SimpleNamespace(
+        cause="coulomb", at=(0, 1), probability=0.96, parameters={"F": estimate}, rivals=(rival,), sentence="sticks"
+    )
+    return SimpleNamespace(verdict="cause", findings=(found,), gain=gain)
+
+
+def test_a_diagnosis_becomes_plain_types():
+    answer = blind.answer(diagnosis(SimpleNamespace(closed=0.98)))
+    assert json.loads(json.dumps(answer)) == answer
+    assert answer["findings"][0]["parameters"] == {"F": {"value": 2.0, "low": 1.9, "high": 2.1}}
+    assert answer["findings"][0]["rivals"] == [{"cause": "quadratic_damping", "at": [0, 1], "probability": 0.04}]
+    assert answer["closed"] == 0.98
+    assert blind.answer(diagnosis(None))["closed"] is None
+
+
+def test_a_diagnosis_that_fails_becomes_a_row_with_its_error(monkeypatch: pytest.MonkeyPatch):
+    def broken(challenge):
+        raise ValueError("no such thing")
+
+    monkeypatch.setattr(blind, "_diagnose", broken)
+    result = blind.examine(0, {"causes": ["force_gain"], "excitation": ["harmonic"]})
+    assert (result["verdict"], result["error"], result["cause"]) == (
+        "failed",
+        "ValueError: no such thing",
+        "force_gain",
+    )
+    assert json.loads(json.dumps(result)) == result
+    assert not exact(result)
+
+
+def test_a_repeated_call_examines_only_the_seeds_that_are_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    asked = []
+
+    def answers(seeds, drawing, jobs):
+        for seed in seeds:
+            asked.append(seed)
+            yield row("none", "consistent", seed=seed, drawing=drawing)
+
+    monkeypatch.setattr(blind, "answers", answers)
+    drawing, out, told = {"noise": [0.01]}, tmp_path / "rows.jsonl", []
+    assert len(blind.run(range(0, 2), drawing, 1, out, told.append)) == 2
+    rows = blind.run(range(1, 4), drawing, 1, out, told.append)
+    assert asked == [0, 1, 2, 3]
+    assert sorted(r["seed"] for r in rows) == [1, 2, 3]
+    assert [json.loads(line)["seed"] for line in out.read_text().splitlines()] == [0, 1, 2, 3]
+    assert told[2] == "1 done before, 2 to do"
+    assert len(blind.run(range(1, 4), drawing, 1, out, told.append)) == 3 and asked == [0, 1, 2, 3]
+
+
+def test_what_is_done_is_kept_when_the_examination_is_interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def answers(seeds, drawing, jobs):
+        yield row("none", "consistent", seed=0, drawing=drawing)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(blind, "answers", answers)
+    out, told = tmp_path / "rows.jsonl", []
+    assert len(blind.run(range(0, 2), {}, 1, out, told.append)) == 1
+    assert len(out.read_text().splitlines()) == 1
+    assert told[-1] == "stopped; what is done is counted below and kept"
+
+
+def test_a_file_of_another_drawing_is_refused(tmp_path: Path):
+    out = tmp_path / "rows.jsonl"
+    out.write_text(json.dumps(row("none", "consistent", drawing={"noise": [0.01]})) + "\n")
+    with pytest.raises(ValueError, match=r"`--out` must name a new file .* was drawn with {'noise': \[0.01\]}"):
+        blind.run(range(2), {"noise": [0.05]}, 1, out, print)
+
+
+def test_a_line_of_progress_tells_the_time_left():
+    line = blind.progress_line(NAMED, done=2, total=10, elapsed=60.0)
+    assert line == "[ 2/10] ok    seed 1: coulomb -> coulomb p=0.99  2.0 s, 4.0 min left"
+    assert "WRONG seed 7: coulomb -> quadratic_damping p=0.97" in blind.progress_line(SURE_AND_WRONG, 1, 1, 1.0)

@@ -1,0 +1,177 @@
+"""The rooms of the house: who may import whom, and what importing it must not do."""
+
+import ast
+import graphlib
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[1] / "jfsm"
+
+# In the order of the house: a room imports only rooms to its left.
+ROOMS = (
+    "_types",
+    "_result",
+    "reporting",
+    "records",
+    "structures",
+    "surrogates",
+    "dynamics",
+    "estimation",
+    "identification",
+    "diagnosis",
+    "systems",
+    "cli",
+)
+
+
+def module_files(package: Path) -> dict[str, Path]:
+    """Every module of a package by its dotted name; a folder is named for its ``__init__``."""
+    files = {}
+    for path in sorted(package.rglob("*.py")):
+        parts = path.relative_to(package.parent).with_suffix("").parts
+        files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return files
+
+
+def runs_later(node: ast.AST) -> bool:
+    """Whether loading a module passes this part over: function bodies, and imports for type checkers alone."""
+    for_types_only = isinstance(node, ast.If) and ast.unparse(node.test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING")
+    return for_types_only or isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda)
+
+
+def imported_modules(name: str, path: Path, known: set[str], *, at_load: bool) -> Iterator[tuple[str, int]]:
+    """Modules among `known` that a module imports (`at_load`: as it is loaded), each with its line."""
+    package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
+    pending: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"), filename=str(path))]
+    while pending:
+        node = pending.pop()
+        if at_load and runs_later(node):
+            continue
+        pending.extend(ast.iter_child_nodes(node))
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, node.lineno) for alias in node.names if alias.name in known)
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) + 1 - node.level] if node.level else []
+            source = ".".join([*base, *(node.module.split(".") if node.module else [])])
+            for alias in node.names:
+                member = f"{source}.{alias.name}"
+                if member in known:
+                    yield member, node.lineno
+                elif source in known:
+                    yield source, node.lineno
+
+
+def room_violations(package: Path) -> list[str]:
+    """Every import that goes against the order of the rooms, as one line each."""
+    files = module_files(package)
+    found = []
+    for name, path in files.items():
+        parts = name.split(".")
+        if len(parts) == 1 or parts[1] == "__main__":  # the front door and `python -m` may import everything
+            continue
+        where = path.relative_to(package.parent)
+        if parts[1] not in ROOMS:
+            found.append(f"{where} belongs to no room; add `{parts[1]}` to the order of the house")
+            continue
+        for target, line in imported_modules(name, path, set(files), at_load=False):
+            room = target.split(".")[1] if "." in target else None
+            if room is None:
+                found.append(f"{where}:{line} imports the front door; import from the room that owns the name")
+            elif room != parts[1] and (room not in ROOMS or ROOMS.index(room) >= ROOMS.index(parts[1])):
+                found.append(f"{where}:{line} imports {target}, which is not above `{parts[1]}`")
+    return found
+
+
+def import_cycle(package: Path) -> list[str] | None:
+    """Modules that import each other while being loaded, or None."""
+    files = module_files(package)
+    graph = {
+        name: {target for target, _ in imported_modules(name, path, set(files), at_load=True)} - {name}
+        for name, path in files.items()
+    }
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        return error.args[1]
+    return None
+
+
+def build_package(root: Path, files: dict[str, str]) -> Path:
+    package = root / "jfsm"
+    for name, text in files.items():
+        path = package / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    return package
+
+
+def test_a_room_imports_only_rooms_listed_above_it():
+    assert not room_violations(PACKAGE), "\n".join(room_violations(PACKAGE))
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    assert import_cycle(PACKAGE) is None
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "from ..diagnosis import diagnose",
+        "from .. import diagnosis",
+        "import jfsm.diagnosis",
+        "from jfsm.diagnosis import diagnose",
+        "from jfsm import diagnosis",
+        "def late():\n    from ..diagnosis import diagnose",
+        "from jfsm import diagnose",
+    ],
+)
+def test_an_import_from_a_lower_room_is_seen_however_it_is_written(tmp_path, statement):
+    package = build_package(
+        tmp_path,
+        {
+            "__init__.py": "from .diagnosis import diagnose as diagnose",
+            "records/__init__.py": "",
+            "records/_record.py": statement,
+            "diagnosis/__init__.py": "def diagnose(): ...",
+        },
+    )
+    (violation,) = room_violations(package)
+    assert violation.startswith("jfsm/records/_record.py:")
+
+
+def test_a_module_outside_every_room_is_seen(tmp_path):
+    package = build_package(tmp_path, {"__init__.py": "", "_misc.py": ""})
+    assert room_violations(package) == ["jfsm/_misc.py belongs to no room; add `_misc` to the order of the house"]
+
+
+def test_a_circle_of_imports_is_seen(tmp_path):
+    circle = {"records/__init__.py": "", "records/_a.py": "from ._b import b", "records/_b.py": "from . import _a"}
+    assert set(import_cycle(build_package(tmp_path, {"__init__.py": "", **circle})) or ()) == {
+        "jfsm.records._a",
+        "jfsm.records._b",
+    }
+
+
+@pytest.mark.parametrize("later", ["if TYPE_CHECKING:\n    from ._b import b", "def late():\n    from ._b import b"])
+def test_an_import_that_loading_passes_over_closes_no_circle(tmp_path, later):
+    files = {"records/__init__.py": "", "records/_a.py": later, "records/_b.py": "from ._a import a"}
+    assert import_cycle(build_package(tmp_path, {"__init__.py": "", **files})) is None
+
+
+def test_importing_jfsm_changes_no_configuration_and_prints_nothing():
+    program = (
+        "import numpy as np, jax\n"
+        "before, before_errors = dict(jax.config.values), np.geterr()\n"
+        "import jfsm\n"
+        "changed = [name for name, value in before.items() if jax.config.values[name] != value]\n"
+        "assert not changed, f'jax configuration changed: {changed}'\n"
+        "assert np.geterr() == before_errors, 'numpy error handling changed'\n"
+        "assert not jax._src.xla_bridge._backends, 'a device was started'\n"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=PACKAGE.parent)
+    assert run.returncode == 0, run.stderr
+    assert (run.stdout, run.stderr) == ("", "")
