@@ -16,8 +16,11 @@ from ..identification import (
 )
 from ..structures import Cause, Structure, causes
 
-_START = 0.1
-"""First guess of an effect as a share of the elastic force."""
+_START, _START_AT_PEAK = 0.1, 0.3
+"""First guess of an effect as a share of the elastic force, in the mean and at the largest displacement.
+
+A softening spring that outweighs the elastic one at a peak would let the motion run away from the start.
+"""
 
 
 @dataclass(frozen=True)
@@ -88,18 +91,16 @@ def driven(nuisances: Nuisances) -> bool:
 
 
 def _starts(model: Structure, cause: Cause, at: tuple, nuisances: Nuisances) -> tuple[Structure, ...]:
-    signs = (cause.sign,) if cause.sign else (1, -1)
     structures = []
-    for sign in signs:
-        parameter = cause.effect.parameters[0]
+    parameter = cause.effect.parameters[0]
+    # A law of degree n in the displacement weighs crest^(n - 1) times more at the largest displacement.
+    degree = 1 if parameter.time else -parameter.length
+    share = min(_START, _START_AT_PEAK / nuisances.crest ** max(degree - 1, 0))
+    for sign in (cause.sign,) if cause.sign else (1, -1):
         unit = cause.effect(**{p.name: float(sign) for p in cause.effect.parameters}, at=at)
         extended = model + unit
-        path = next(
-            p
-            for p in reversed(extended.entries())
-            if p.startswith(f"{unit.kind}@") and p.split(".")[1].startswith(parameter.name)
-        )
-        structures.append(extended.with_values({path: sign * _START * natural_size(extended, path, nuisances)}))
+        path = next(p for p in extended.entries() if p not in model.entries())
+        structures.append(extended.with_values({path: sign * share * natural_size(extended, path, nuisances)}))
     return tuple(structures)
 
 

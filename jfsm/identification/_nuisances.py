@@ -42,6 +42,8 @@ class Nuisances:
         signal fills its band.
     length, omega : float
         Size of the motion [length unit] and its angular frequency [rad/s]: the scales of priors.
+    crest : float
+        Largest reading over the standard deviation, in the channel closest to a displacement.
     x0, v0 : (dof,) arrays
         First guess of the initial state; `at_rest` says that it is known.
     """
@@ -56,6 +58,7 @@ class Nuisances:
     floor: np.ndarray
     trusted: np.ndarray
     length: float
+    crest: float
     omega: float
     x0: np.ndarray
     v0: np.ndarray
@@ -112,7 +115,7 @@ def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "
     force, force_variance, share, words = _force(record, dof)
     notes += words
     omega = fastest_mode(model) or 2 * np.pi / max(record.duration, dt)
-    length = _length(channels, spread, omega)
+    length, crest = _size(channels, values, spread, omega)
     masses = np.asarray(model.mass)
     mass = masses if masses.ndim == 1 else np.diag(masses)
     variance = np.array(floors) ** 2
@@ -141,6 +144,7 @@ def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "
         floor=np.array(floors),
         trusted=np.array(trusted),
         length=length,
+        crest=crest,
         omega=omega,
         x0=x0,
         v0=v0,
@@ -178,7 +182,9 @@ def _force(record: Record, dof: int) -> tuple[np.ndarray, np.ndarray, float, lis
     return force, variance, share, notes
 
 
-def _length(channels: tuple[Channel, ...], spread: np.ndarray, omega: float) -> float:
-    power = {"displacement": 0, "velocity": 1, "acceleration": 2}
-    sizes = {power[kind]: size / omega ** power[kind] for (kind, _), size in zip(channels, spread, strict=True)}
-    return float(sizes[min(sizes)])
+def _size(channels: tuple[Channel, ...], values: np.ndarray, spread: np.ndarray, omega: float) -> tuple[float, float]:
+    """Size of the displacement and its crest factor, from the channel closest to it."""
+    power = [("displacement", "velocity", "acceleration").index(kind) for kind, _ in channels]
+    i = int(np.argmin(power))
+    crest = float(np.max(np.abs(values[:, i] - np.mean(values[:, i])))) / spread[i]
+    return float(spread[i] / omega ** power[i]), crest
