@@ -8,6 +8,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -18,7 +19,7 @@ from .identification import fit
 from .records import Record, read
 from .structures import Structure
 
-MASS, STIFFNESS, DAMPING, FRICTION = 1.5, 2400.0, 2.4, 4.0  # kg, N/m, N s/m, N
+MASS, STIFFNESS, DAMPING, FRICTION = 1.5, 2400.0, 2.4, 8.0  # kg, N/m, N s/m, N
 FORCE = 20.0  # N, root mean square
 RATE, SAMPLES = 200.0, 3000  # Hz; 31 samples per natural period
 NOISE = 0.01  # of each channel's standard deviation
@@ -46,8 +47,8 @@ class Multisine:
     """Force g(t) = Σ amplitude·cos(omega t + phase) [N]; `omega` (lines,) [rad/s], `phase` (lines,) [rad]."""
 
     amplitude: float
-    omega: Float[np.ndarray, "lines"]
-    phase: Float[np.ndarray, "lines"]
+    omega: Float[np.ndarray, " lines"]
+    phase: Float[np.ndarray, " lines"]
 
     def __call__(self, t: float) -> float:
         return self.amplitude * float(np.sum(np.cos(self.omega * t + self.phase)))
@@ -71,7 +72,9 @@ def hidden_friction(seed: int = 0, samples: int = SAMPLES) -> Demonstration:
     time = np.arange(samples) / RATE
     lines = 2 * math.pi * np.linspace(1.5, 15.0, 40)
     drive = Multisine(FORCE * math.sqrt(2 / lines.size), lines, rng.uniform(0.0, 2 * math.pi, lines.size))
-    noisy = {kind: y + NOISE * np.std(y) * rng.standard_normal(samples) for kind, y in _rub(drive, time).items()}
+    noisy: dict[str, Any] = {
+        kind: y + NOISE * np.std(y) * rng.standard_normal(samples) for kind, y in _rub(drive, time).items()
+    }
     return Demonstration(
         record=Record(time, **noisy, at_rest=True, name="Demonstration"),
         model=Structure.sdof(MASS, BELIEVED_STIFFNESS * STIFFNESS, BELIEVED_DAMPING * DAMPING),
@@ -88,8 +91,11 @@ def hidden_friction(seed: int = 0, samples: int = SAMPLES) -> Demonstration:
     )
 
 
-def _rub(drive: Multisine, time: Float[np.ndarray, "n"]) -> dict[str, Float[np.ndarray, "n"]]:
-    """Motion from rest on `time`, one smooth piece after another: held (0), or slipping forward (1) or backward (-1)."""
+def _rub(drive: Multisine, time: Float[np.ndarray, " n"]) -> dict[str, Float[np.ndarray, " n"]]:
+    """Force, and motion from rest, on `time`.
+
+    One smooth piece follows another: the mass is held (0), or slips forward (1) or backward (-1).
+    """
     slack = _TOLERANCE * FORCE / math.sqrt(STIFFNESS * MASS)  # m/s: a slip is not over at the instant it begins
 
     def load(t: float, x: float) -> float:
@@ -166,9 +172,10 @@ def measured(
         model=linear,
         holdout=unseen,
         introduction=(
-            f"A measured record: {Path(path).name}. Its first {len(seen)} samples are diagnosed, its last {len(unseen)} "
-            f"held out. The model that is believed is the best linear one: mass, stiffness and damping fitted to the "
-            f"same {len(seen)} samples, from a first guess off their frequency response."
+            f"A measured record: {Path(path).name}, force in {record.units['force']}, displacement in "
+            f"{record.units['displacement']}. Its first {len(seen)} samples are diagnosed, its last {len(unseen)} held "
+            f"out. The model that is believed is the best linear one: mass, stiffness and damping fitted to the same "
+            f"{len(seen)} samples, from a first guess off their frequency response."
         ),
     )
 
@@ -187,7 +194,8 @@ def first_guess(record: Record) -> Structure:
     channels = record.channels
     for channel in (("force", 1), ("displacement", 1)):
         if channel not in channels:
-            raise ValueError(f"`record` must hold {channel[0]} {channel[1]}; it holds {', '.join(map(str, channels))}.")
+            held = ", ".join(f"{kind} {dof}" for kind, dof in channels) or "nothing"
+            raise ValueError(f"`record` must hold {channel[0]} {channel[1]}; it holds {held}.")
     g, x = channels["force", 1], channels["displacement", 1]
     length = len(record) // 4  # seven segments that overlap by half: as fine as a first look can be averaged
     for _ in range(2):
@@ -211,8 +219,8 @@ def first_guess(record: Record) -> Structure:
     )
     if h.size < 3 or min(mass, stiffness, damping) <= 0:
         raise ValueError(
-            f"`record` must show a resonance of one mass on a spring between force 1 and displacement 1; about the peak of "
-            f"its frequency response at {peak:.4g} Hz a fit gives mass {mass:.4g}, stiffness {stiffness:.4g}, damping "
-            f"{damping:.4g}. Check which channel is which."
+            f"`record` must show a resonance of one mass on a spring between force 1 and displacement 1; about the "
+            f"peak of its frequency response at {peak:.4g} Hz a fit gives mass {mass:.4g}, stiffness {stiffness:.4g}, "
+            f"damping {damping:.4g}. Check which channel is which."
         )
     return Structure.sdof(mass, stiffness, damping)

@@ -24,6 +24,7 @@ ROOMS = (
     "identification",
     "diagnosis",
     "systems",
+    "demo",
     "cli",
 )
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import numpy as np
@@ -140,7 +141,7 @@ def _noise(
 
 
 def _like(record: Record, channels: dict[tuple, np.ndarray]) -> Record:
-    kinds: dict[str, dict[int, np.ndarray]] = {}
+    kinds: dict[str, Any] = {}
     for (kind, j), y in channels.items():
         kinds.setdefault(kind, {})[j] = y
     return Record(

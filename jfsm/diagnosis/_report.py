@@ -9,6 +9,7 @@ import numpy as np
 from ..identification import Nuisances
 from ..structures import PARAMETER_CAUSES, AbstractTerm, Structure
 from ._decide import Decision
+from ._detectable import detectable
 from ._diagnosis import CandidateResult, Diagnosis, Estimate, Finding, Rival
 from ._gain import Gain
 from ._residual import Residual, curves
@@ -43,6 +44,7 @@ def assemble(
     }
     notes = tuple(dict.fromkeys(note for n in records for note in n.notes))
     noise = {f"{kind} {j}": float(s) for n in records[:1] for (kind, j), s in zip(n.channels, n.floor, strict=True)}
+    smallest = _detectable(trials, model, units)
     sentence, advice = _words(decision, findings, gain)
     data = {
         "jfsm": _version(),
@@ -57,12 +59,13 @@ def assemble(
         "refitted": {p: {"given": model.values()[p], **_plain(e)} for p, e in refit.items()},
         "gain": None if gain is None else _gain(gain),
         "notes": list(notes),
-        "detectable": {},
+        "detectable": {c: {"parameter": p, "value": e.value, "unit": e.unit} for c, (p, e) in smallest.items()},
         "curves": {"holdout": _holdout(runs), **curves(missing, units, _law(decision, extended))},
     }
     return Diagnosis(
         verdict=decision.verdict, findings=findings, candidates=candidates, extended=extended, refitted=refit,
-        gain=gain, detectable={}, noise=noise, notes=notes, sentence=sentence, advice=advice, data=data,
+        gain=gain, detectable={c: e for c, (_, e) in smallest.items()}, noise=noise, notes=notes,
+        sentence=sentence, advice=advice, data=data,
     )  # fmt: skip
 
 
@@ -81,6 +84,19 @@ def _version() -> str:
 
 def _unit(structure: Structure, path: str, units) -> str:
     return structure.entries()[path][0].unit(units["force"], units["displacement"])
+
+
+def _detectable(trials: list[Trial], model: Structure, units) -> dict[str, tuple[str, Estimate]]:
+    """Parameter and smallest size of every cause at the place where it would have shown first."""
+    found: dict[str, tuple[str, Estimate]] = {}
+    for t in trials:
+        size = detectable(t, set(model.entries()))
+        if size is None or not math.isfinite(size[1]):
+            continue
+        path, value = size
+        if t.name not in found or value < found[t.name][1].value:
+            found[t.name] = (path.split(".")[-1], Estimate(value, value, value, _unit(t.structure, path, units)))
+    return found
 
 
 def _estimate(t: Trial, path: str, model: Structure, units) -> Estimate:
@@ -160,7 +176,7 @@ def _words(decision: Decision, findings: tuple[Finding, ...], gain: Gain | None)
     if decision.verdict == "parameters":
         what = "; ".join(f.sentence for f in findings) or "its own values moved together"
         return f"The form of the model is right, its values are off: {what}.{share}", "Use the refitted values."
-    if decision.verdict == "cause":
+    if decision.verdict == "cause" and decision.winner.cause is not None:
         f = findings[0]
         where = "-".join(str(a) for a in f.at)
         return (

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
 from ..dynamics._plant import direction, lower
@@ -54,7 +55,7 @@ def residual(trial: Trial, model: Structure, nuisances: Nuisances, until: int) -
         )
     except (ValueError, RuntimeError):  # one orbit only, or too few points: there is no surface to draw
         force_map = None
-    return Residual(tuple(model.links[link]), d, w, f, force_map)
+    return Residual(model.links[link], d, w, f, force_map)
 
 
 def stand_in(found: Residual, refitted: Trial, records: list[Nuisances], until: list[int]) -> Trial | None:
@@ -108,9 +109,11 @@ def curves(found: Residual, units, term: AbstractTerm | None) -> dict[str, Any]:
             "visited": visited.tolist(),
         }
     if term is not None:
-        zero = np.zeros(())
+        zero = jnp.zeros(())
+        along_x = [float(term.force(d, zero, (), zero)) for d in jnp.asarray(x)]
+        along_v = [float(term.force(zero, w, (), zero)) for w in jnp.asarray(v)]
         drawn["law"] = {
-            "displacement": x.tolist(), "force_of_displacement": [float(term.force(d, zero, (), zero)) for d in x],
-            "velocity": v.tolist(), "force_of_velocity": [float(term.force(zero, w, (), zero)) for w in v],
+            "displacement": x.tolist(), "force_of_displacement": along_x,
+            "velocity": v.tolist(), "force_of_velocity": along_v,
         }  # fmt: skip
     return drawn

@@ -14,7 +14,9 @@ from ._trial import Trial, trial
 _LADDER = (0.3, 0.03, 0.01)
 """Rungs for a candidate: the refit has been at the top already."""
 _FAR_BEHIND = 200.0
-"""Nats behind the leader, one per cent of unmodelled force forgiven, from which a candidate is not pursued."""
+"""Nats behind the leader, one per cent of unmodelled force forgiven, from which a candidate is not pursued,"""
+_ALWAYS_PURSUED = 3
+"""unless it is among the best of them."""
 
 
 @dataclass(frozen=True)
@@ -75,10 +77,10 @@ def search(
         approached.append(_approach(lot, model, start, records, until))
     leader = min([refitted.rung, *(lot.best for lot in approached)])
     trials, best = [], refitted.value
-    for lot in sorted(approached, key=lambda lot: lot.best):
+    for rank, lot in enumerate(sorted(approached, key=lambda lot: lot.best)):
         tell("the best candidates")
         behind = lot.best - leader
-        pursued = behind < _FAR_BEHIND
+        pursued = rank < _ALWAYS_PURSUED or behind < _FAR_BEHIND
         found = finish(lot.posterior, lot.rung, best=best) if pursued else lot.rung
         for lane, candidate in enumerate(lot.candidates):
             done = trial(lot.posterior, found, lane, candidate.cause, candidate.at, float(lot.rung.value[lane]))

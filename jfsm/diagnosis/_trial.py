@@ -41,6 +41,7 @@ class Trial:
     unknowns: tuple[Unknown, ...]
     theta: np.ndarray
     covariance: np.ndarray
+    information: np.ndarray
     evidence: float
     value: float
     rung: float
@@ -141,6 +142,7 @@ def trial(posterior: Posterior, maximum: Maximum, lane: int, cause: Cause | None
         unknowns=unknowns,
         theta=theta,
         covariance=np.linalg.pinv(maximum.information[lane], hermitian=True),
+        information=maximum.information[lane],
         evidence=maximum.evidence(lane),
         value=float(maximum.value[lane]),
         rung=rung,

@@ -34,7 +34,8 @@ def true_force(
 ) -> Float[Array, "halves dof"]:
     """Force on the masses from the measured one: gain and offset of its sensor undone, the base's inertia added."""
     inertia = jnp.sum(plant.mass, 1)
-    return (force - plant.force_offset) / (1.0 + plant.force_gain) - base[:, None] * inertia
+    measured = (force - plant.force_offset[None, :]) / (1.0 + plant.force_gain)[None, :]
+    return measured - base[:, None] * inertia[None, :]
 
 
 def advance_sample(plant: Plant, minv, motion: Motion, force, time, step) -> Motion:
@@ -62,7 +63,7 @@ def run_grid(plant: Plant, fine: Fine, x0: Float[Array, " dof"], v0: Float[Array
     def body(motion, inputs):
         force, base, time = inputs
         g = true_force(plant, force, base)
-        a = acceleration(plant, minv, *motion, g[0], time)[0]
+        a = acceleration(plant, minv, motion.x, motion.v, motion.mode, g[0], time)[0]
         return advance_sample(plant, minv, motion, g, time, fine.step), (motion.x, motion.v, a)
 
     first = true_force(plant, fine.force[0], fine.base[0])[0]

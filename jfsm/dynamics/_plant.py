@@ -17,8 +17,6 @@ from ..structures import (
     FRICTION_TERMS,
     SMOOTH_TERMS,
     AbstractFriction,
-    AccelerationGain,
-    ForceGain,
     LinearDamping,
     LinearStiffness,
     MapTerm,
@@ -126,21 +124,14 @@ def lower(
             maps.append(MapSlot(term.force_map, jnp.asarray(row)))
         else:
             (friction if isinstance(term, AbstractFriction) else smooth).append(term)
-    sensors = {
-        ForceGain: np.zeros(dof),
-        "force": np.zeros(dof),
-        AccelerationGain: np.zeros(len(channels)),
-        "channel": np.zeros(len(channels)),
-    }
+    force_gain, force_offset = np.zeros(dof), np.zeros(dof)
+    channel_gain, channel_offset = np.zeros(len(channels)), np.zeros(len(channels))
     for sensor in structure.sensors:
+        offset = isinstance(sensor, Offset)
         if sensor.at[0] == "force":
-            sensors[ForceGain if isinstance(sensor, ForceGain) else "force"][sensor.at[1] - 1] += float(
-                sensor.b if isinstance(sensor, Offset) else sensor.eps
-            )
+            (force_offset if offset else force_gain)[sensor.at[1] - 1] += sensor.value
         elif sensor.at in channels:
-            sensors["channel" if isinstance(sensor, Offset) else AccelerationGain][list(channels).index(sensor.at)] += (
-                float(sensor.b if isinstance(sensor, Offset) else sensor.eps)
-            )
+            (channel_offset if offset else channel_gain)[list(channels).index(sensor.at)] += sensor.value
     return Plant(
         mass=jnp.asarray(np.diag(mass) if mass.ndim == 1 else mass),
         damping=jnp.asarray(matrices[LinearDamping]),
@@ -148,10 +139,10 @@ def lower(
         smooth=_slots(smooth, SMOOTH_TERMS, max(smooth_slots, len(smooth)), dof),
         friction=_slots(friction, FRICTION_TERMS, max(friction_slots, len(friction)), dof),
         maps=tuple(maps),
-        force_gain=jnp.asarray(sensors[ForceGain]),
-        force_offset=jnp.asarray(sensors["force"]),
-        channel_gain=jnp.asarray(sensors[AccelerationGain]),
-        channel_offset=jnp.asarray(sensors["channel"]),
+        force_gain=jnp.asarray(force_gain),
+        force_offset=jnp.asarray(force_offset),
+        channel_gain=jnp.asarray(channel_gain),
+        channel_offset=jnp.asarray(channel_offset),
     )
 
 

@@ -45,5 +45,6 @@ def run_reference(plant: Plant, fine: Fine, x0, v0, tolerance, scale):
         max_steps=_STEPS_PER_SAMPLE * n,
         throw=False,
     )
+    assert solution.ys is not None
     x, v = solution.ys
     return x, v, solution.result == diffrax.RESULTS.successful

@@ -150,7 +150,7 @@ def _totals(model: Structure, effect: type[AbstractSensor]) -> dict[tuple[str, i
 
 
 def with_tables(model: Structure) -> Structure:
-    """The structure with every map frozen to a table: looked up in every step a map would cost a thousand times more."""
+    """The structure with every map frozen to a table: in every step a map would cost a thousand times more."""
     terms = [
         tabulate(t.force_map).on(t.at)
         if isinstance(t, MapTerm) and isinstance(t.force_map, AbstractForceStateMap)

@@ -16,6 +16,8 @@ from ._plant import Plant, friction_limits, smooth_force
 
 _SEGMENTS = 3
 """Modes that one step may pass through: slide, stick, slide."""
+_SHARED = 1e-10
+"""Compliance of a sticking link beside the masses': links that close a loop, or lie side by side, share the load."""
 
 
 class Motion(NamedTuple):
@@ -64,6 +66,7 @@ def holding_force(plant: Plant, minv, a, sticking):
     both = sticking[:, None] & sticking[None, :]
     matrix = jnp.where(both, compliance, jnp.eye(rows.shape[0]))
     matrix = jnp.where(jnp.diag(matrix)[:, None] > 0, matrix, jnp.eye(rows.shape[0]))
+    matrix = matrix + _SHARED * jnp.diag(jnp.diag(matrix))
     return jnp.linalg.solve(matrix, jnp.where(sticking, need, 0.0))
 
 
@@ -87,15 +90,17 @@ def mode_at(plant: Plant, minv, x, v, g, t):
     if not len(plant.friction):
         return jnp.zeros(0)
     speed = jnp.sum(plant.friction.direction * v[None, :], 1)
-    return jnp.where(speed != 0, jnp.sign(speed), _mode_from_rest(plant, minv, x, v, g, t))
+    return _from_rest(plant, minv, x, v, g, t, jnp.sign(speed))
 
 
-def _mode_from_rest(plant: Plant, minv, x, v, g, t):
-    # Force needed to hold each link alone; beyond a limit the link breaks away in that direction.
-    a = free_acceleration(plant, minv, x, v, g, t)
-    held = holding_force(plant, minv, a, jnp.ones(len(plant.friction), bool))
-    low, high = friction_limits(plant, x, jnp.zeros_like(v), t)
-    return jnp.where(held > high, 1.0, jnp.where(held < low, -1.0, 0.0))
+def _from_rest(plant: Plant, minv, x, v, g, t, mode):
+    # Force needed to hold the links at rest while the others slide; beyond a limit a link breaks away.
+    rows, rest = plant.friction.direction, mode == 0
+    low, high = friction_limits(plant, x, v, t)
+    sliding = jnp.where(mode > 0, high, jnp.where(mode < 0, low, 0.0))
+    a = free_acceleration(plant, minv, x, v, g, t) - _times(minv, jnp.sum(rows * sliding[:, None], 0))
+    held = holding_force(plant, minv, a, rest)
+    return jnp.where(rest, jnp.where(held > high, 1.0, jnp.where(held < low, -1.0, 0.0)), mode)
 
 
 def _runge_kutta(plant: Plant, minv, x, v, mode, load: Load, start, share):
@@ -135,9 +140,11 @@ def advance(plant: Plant, minv, motion: Motion, load: Load) -> Motion:
         switching = ended & (shares == share)
         rows = plant.friction.direction
         vs = vs - _remove(minv, rows, jnp.sum(rows * vs[None, :], 1), switching & (mode != 0))
-        rest = _mode_from_rest(plant, minv, xs, vs, load.at(now), load.time + now * load.step)
+        decided = _from_rest(
+            plant, minv, xs, vs, load.at(now), load.time + now * load.step, jnp.where(switching, 0.0, mode)
+        )
         x, v = jnp.where(any_event, xs, xe), jnp.where(any_event, vs, ve)
-        return (x, v, jnp.where(switching, rest, mode), jnp.where(any_event, now, 1.0)), None
+        return (x, v, jnp.where(switching, decided, mode), jnp.where(any_event, now, 1.0)), None
 
     # The last segment goes to the end whatever happens; a step is short beside the time between reversals.
     last = jnp.arange(_SEGMENTS) == _SEGMENTS - 1
@@ -178,7 +185,8 @@ def _event(plant, minv, path, mode, load, start, left):
 
     def margin(s):
         place = start + left * s
-        return acceleration(plant, minv, *path(s), mode, load.at(place), load.time + place * load.step)[1]
+        x, v = path(s)
+        return acceleration(plant, minv, x, v, mode, load.at(place), load.time + place * load.step)[1]
 
     slots = jnp.arange(len(plant.friction))
 

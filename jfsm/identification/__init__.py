@@ -12,6 +12,7 @@ from ._nuisances import prepare as prepare
 from ._posterior import LANES as LANES
 from ._posterior import Hypothesis as Hypothesis
 from ._posterior import Posterior as Posterior
+from ._posterior import prior as prior
 from ._unknowns import Unknown as Unknown
 from ._unknowns import effect_unknown as effect_unknown
 from ._unknowns import free_unknown as free_unknown

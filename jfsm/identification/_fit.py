@@ -134,13 +134,15 @@ def free_paths(model: Structure, records: Sequence[Nuisances], fixed: Sequence[s
 def without_small_offsets(
     structure: Structure, unknowns: Sequence[Unknown], theta: np.ndarray, error: np.ndarray
 ) -> Structure:
-    """The structure without the offsets that are not three standard errors from nothing."""
-    small = {
-        u.path
-        for u, t, s in zip(unknowns, theta, error, strict=True)
-        if u.path.startswith("offset@") and abs(t) < 3 * s
-    }
-    kept = [s for s in structure.sensors if f"{s.kind}@{s.place}.b" not in small]
+    """The structure without the offsets that are not three standard errors from nothing.
+
+    It carries those of the first record that measures the channel, so these decide.
+    """
+    small: dict[str, bool] = {}
+    for u, t, s in zip(unknowns, theta, error, strict=True):
+        if u.path.startswith("offset@"):
+            small.setdefault(u.path, abs(t) < 3 * s)
+    kept = [s for s in structure.sensors if not small.get(f"{s.kind}@{s.place}.b", False)]
     return Structure(structure.mass, structure.terms, kept, structure.trust)
 
 

@@ -121,7 +121,7 @@ def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "
     variance = np.array(floors) ** 2
     for i, (kind, j) in enumerate(channels):
         if kind == "acceleration":  # an acceleration is predicted with the force's own noise, less what smoothing took
-            variance[i] += force_variance[j - 1] * share / mass[j - 1] ** 2
+            variance[i] += force_variance[j - 1] * share[j - 1] / mass[j - 1] ** 2
     n, padded = len(record), bucket(len(record))
     fill = ((0, padded - n), (0, 0))
     readings = Readings(
@@ -154,14 +154,14 @@ def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "
     )
 
 
-def _force(record: Record, dof: int) -> tuple[np.ndarray, np.ndarray, float, list[str]]:
+def _force(record: Record, dof: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
     """Force samples to run with, variance of their noise, share of it left in them, and notes.
 
     Where the force is smooth on its own grid, its noise is smoothed away; where it fills the band, the spline's
     residual is signal, and the noise is taken as a thousandth of the force.
     """
     force, notes = measured_force(record, dof), []
-    variance, share = np.zeros(dof), 1.0
+    variance, share = np.zeros(dof), np.ones(dof)
     for (kind, j), samples in record.channels.items():
         if kind != "force":
             continue
@@ -176,7 +176,7 @@ def _force(record: Record, dof: int) -> tuple[np.ndarray, np.ndarray, float, lis
         floor = noise_floor(samples, record.dt)
         if floor.spacing >= _OVERSAMPLED:
             force[:, j - 1] = floor.smooth
-            variance[j - 1], share = floor.std**2, floor.effective_parameters / samples.size
+            variance[j - 1], share[j - 1] = floor.std**2, floor.effective_parameters / samples.size
         else:
             variance[j - 1] = (_BAND_LIMITED * float(np.std(samples))) ** 2
     return force, variance, share, notes

@@ -85,7 +85,7 @@ class Posterior:
             v, g, f = (np.asarray(o)[:lanes] for o in out)
             value += v
             gradient[:, mine] += g[:, : len(mine)]
-            information[np.ix_(range(lanes), mine, mine)] += f[:, : len(mine), : len(mine)]
+            information[:, mine[:, None], mine[None, :]] += f[:, : len(mine), : len(mine)]
         for lane in range(lanes):
             p, pg, pf = prior(self.hypothesis.unknowns[lane], theta[lane])
             value[lane] += p

@@ -60,7 +60,8 @@ def own_unknown(structure: Structure, path: str, trust: Mapping[str, float]) -> 
     """A value that the model states: Student's law about it, as wide as it is trusted."""
     value = structure.values()[path]
     kind = path.split("@")[0]
-    width = next((w for name, w in trust.items() if path in structure.select(name)), TRUST.get(kind, 0.25))
+    stated = [name for name in trust if path in structure.select(name)]
+    width = trust[max(stated, key=len)] if stated else TRUST.get(kind, 0.25)  # the longest name says most
     if value == 0:  # nothing to be relative to: damping stated as none
         raise ValueError(
             f"{path} is 0 and cannot be refitted as a share of itself; state a small value, or leave the term out."

@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 
 from ._sensors import AbstractSensor, AccelerationGain, ForceGain
 from ._structure import Structure
-from ._term import AbstractTerm
 from .terms import Coulomb, CubicStiffness, QuadraticDamping, QuadraticStiffness
 
 
@@ -19,7 +18,7 @@ class Cause(NamedTuple):
     id: str
     family: str
     label: str
-    effect: type[AbstractTerm] | type[AbstractSensor]
+    effect: type[Any]
     sign: int
     sentence: str
 
@@ -46,7 +45,7 @@ class Cause(NamedTuple):
             raise ValueError(
                 f"`{names[0]}` of {self.id} must be {'positive' if self.sign > 0 else 'negative'}; got {first}."
             )
-        return self.effect(**parameters, at=at)  # pyright: ignore[reportCallIssue]
+        return self.effect(**parameters, at=at)
 
     def apply(self, model: Structure, at: tuple, **parameters: float) -> Structure:
         """The model extended by this cause."""

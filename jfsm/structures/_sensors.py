@@ -1,5 +1,6 @@
 """What can be wrong on the measuring side: gains of a channel."""
 
+import operator
 from typing import Any, ClassVar
 
 import equinox as eqx
@@ -14,7 +15,7 @@ def as_channel(at: Any) -> tuple[str, int]:
     """A pair (kind, degree of freedom) such as ("force", 1)."""
     try:
         kind, dof = at
-        return str(kind), int(dof)
+        return str(kind), operator.index(dof)
     except (TypeError, ValueError):
         raise ValueError(
             f"`at` of a sensor effect must be (kind, degree of freedom), e.g. ('force', 1); got {at!r}."
@@ -33,6 +34,11 @@ class AbstractSensor(eqx.Module):
     def place(self) -> str:
         """The channel as it stands in a path, ``force-1``."""
         return f"{self.at[0]}-{self.at[1]}"
+
+    @property
+    def value(self) -> float:
+        """The effect's one number."""
+        return float(getattr(self, self.parameters[0].name))
 
     def __check_init__(self):
         allowed = CHANNEL_KINDS if self.channel == "any" else (self.channel,)

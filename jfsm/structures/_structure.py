@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,8 +33,8 @@ class Structure(eqx.Module):
     Raises
     ------
     ValueError
-        If a mass is not positive, the mass matrix is not symmetric, or a term or sensor names a degree of freedom
-        that the structure does not have.
+        If a mass is negative, the mass matrix is not symmetric positive definite, or a term or sensor names a degree
+        of freedom that the structure does not have.
     """
 
     mass: Float[Array, "..."]
@@ -157,7 +158,7 @@ class Structure(eqx.Module):
             for parameter in part.parameters:
                 value = values.get(next(paths))
                 if value is not None:
-                    part = eqx.tree_at(lambda p, name=parameter.name: getattr(p, name), part, jnp.asarray(float(value)))
+                    part = replace(part, **{parameter.name: float(value)})  # checked like a new one
             parts.append(part)
         n = len(self.terms)
         return Structure(mass, parts[:n], parts[n:], self.trust)
@@ -190,7 +191,7 @@ def _check_mass(mass: np.ndarray) -> None:
         if mass.size == 0 or np.any(mass < 0):
             raise ValueError(f"`mass` must hold at least one mass, none negative; got {mass.tolist()}.")
         return
-    if mass.shape[0] != mass.shape[1] or not np.allclose(mass, mass.T):
+    if mass.size == 0 or mass.shape[0] != mass.shape[1] or not np.allclose(mass, mass.T):
         raise ValueError(f"`mass` as a matrix must be square and symmetric; got shape {mass.shape}.")
     smallest = float(np.linalg.eigvalsh(mass)[0])
     if smallest <= 0:

@@ -1,6 +1,7 @@
 """The term contract: everything on the left-hand side of the equation of motion is a term."""
 
 import abc
+import operator
 from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
@@ -37,7 +38,7 @@ class Parameter(NamedTuple):
 def as_link(at: Any) -> tuple[int, int]:
     """A pair (i, j) of two different degrees of freedom; 0 is ground."""
     try:
-        i, j = (int(a) for a in at)
+        i, j = (operator.index(a) for a in at)
     except (TypeError, ValueError):
         raise ValueError(f"`at` must be a pair (i, j) of degrees of freedom, 0 for ground; got {at!r}.") from None
     if i < 0 or j < 0 or i == j:

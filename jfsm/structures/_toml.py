@@ -1,7 +1,5 @@
 """A structure as a TOML file."""
 
-import os
-import tempfile
 import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import tomli_w
 
+from ..reporting import write_text_atomically
 from ._sensors import SENSORS
 from .terms import TERMS
 
@@ -38,15 +37,7 @@ def save(structure: "Structure", path: str | Path) -> None:
             rows.append({"kind": part.kind, "at": list(part.at), **numbers})
         if rows:
             data[key] = rows
-    target = Path(path)
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=target.name, suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            tomli_w.dump(data, file)
-        os.replace(temporary, target)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    write_text_atomically(path, tomli_w.dumps(data))
 
 
 def load(path: str | Path) -> "Structure":
@@ -57,7 +48,8 @@ def load(path: str | Path) -> "Structure":
     FileNotFoundError
         If there is no such file.
     ValueError
-        If the file is not TOML, lacks `mass`, or holds an unknown kind or parameter; names the entry.
+        If the file is not TOML, lacks `mass`, or holds an unknown kind or parameter, or a value that cannot be;
+        names the entry.
     """
     from ._structure import Structure
 
@@ -73,9 +65,24 @@ def load(path: str | Path) -> "Structure":
         raise ValueError(f"{target}: unknown entry {sorted(unknown)[0]!r}; a model has mass, term, sensor, uncertain.")
     if "mass" not in data:
         raise ValueError(f"{target}: `mass` is missing; write e.g. mass = [1.0].")
-    terms = [_part(row, TERMS, f"{target}, term {n}") for n, row in enumerate(data.get("term", []), 1)]
-    sensors = [_part(row, SENSORS, f"{target}, sensor {n}") for n, row in enumerate(data.get("sensor", []), 1)]
-    return Structure(data["mass"], terms, sensors, data.get("uncertain", {}))
+    terms, sensors = (
+        [_part(row, classes, f"{target}, {key} {n}") for n, row in enumerate(_rows(data, key, target), 1)]
+        for key, classes in (("term", TERMS), ("sensor", SENSORS))
+    )
+    trust = data.get("uncertain", {})
+    if not isinstance(trust, dict) or not all(type(share) in (int, float) for share in trust.values()):
+        raise ValueError(f"{target}: [uncertain] must hold shares such as stiffness = 0.05; got {trust!r}.")
+    try:
+        return Structure(data["mass"], terms, sensors).uncertain(**trust)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{target}: {error}") from None
+
+
+def _rows(data: dict[str, Any], key: str, target: Path) -> list[dict[str, Any]]:
+    rows = data.get(key, [])
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise ValueError(f"{target}: {key}s stand under [[{key}]], in double brackets, once for each; got {rows!r}.")
+    return rows
 
 
 def _part(row: dict[str, Any], classes: tuple[type, ...], where: str) -> Any:

@@ -1,0 +1,429 @@
+"""The command line: what it prints, what it writes, and the code it ends with."""
+
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from typer.testing import CliRunner, Result
+
+from jfsm import Record, Structure, read
+from jfsm.cli import app
+
+MASS, STIFFNESS, DAMPING = 2.0, 1800.0, 3.0
+RATE, SAMPLES = 100.0, 500
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def flat(text: str) -> str:
+    """A printed text without the breaks of its lines."""
+    return " ".join(text.split())
+
+
+def refusal(*arguments: object) -> str:
+    """What a command says that refuses its input: one line on standard error, and nothing else anywhere."""
+    result = run(*arguments)
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("jfsm: ")
+    return line
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """A record of a linear oscillator as `run.csv` (columns t, u, y in mm), its model, and a model that is stiffer."""
+    place = tmp_path_factory.mktemp("cli")
+    rng = np.random.default_rng(11)
+    omega, phase = 2 * math.pi * np.linspace(1.0, 10.0, 25), rng.uniform(0, 2 * math.pi, 25)
+
+    def force(t):
+        return np.cos(np.multiply.outer(t, omega) + phase).sum(-1)
+
+    def rate(t, state):
+        return [state[1], (force(t) - DAMPING * state[1] - STIFFNESS * state[0]) / MASS]
+
+    time = np.arange(SAMPLES) / RATE
+    x = solve_ivp(rate, (0, time[-1]), [0, 0], t_eval=time, rtol=1e-10, atol=1e-13).y[0]
+    noisy = [y + 0.01 * np.std(y) * rng.standard_normal(SAMPLES) for y in (force(time), 1e3 * x)]
+    np.savetxt(place / "run.csv", np.column_stack([time, *noisy]), delimiter=",", header="t,u,y", comments="")
+    Structure.sdof(MASS, STIFFNESS, DAMPING).save(place / "model.toml")
+    Structure.sdof(MASS, 1.3 * STIFFNESS, DAMPING).save(place / "stiff.toml")
+    return place
+
+
+@pytest.fixture
+def channels(folder) -> list[object]:
+    return [folder / "run.csv", "--force", "u", "--displacement", "y", "--unit", "u=N", "--unit", "y=mm"]
+
+
+class FakeDiagnosis(SimpleNamespace):
+    """Stands for a diagnosis where only what the command makes of it is of interest."""
+
+    def print(self) -> None:
+        print(f"verdict: {self.verdict}")
+
+
+def answer(monkeypatch, verdict: str = "consistent") -> dict[str, Any]:
+    """Lets `diagnose` return this verdict at once; what it was called with appears in the dictionary."""
+    seen: dict[str, Any] = {}
+
+    def quick(record, model, holdout, key, progress):
+        seen.update(record=record, model=model, holdout=holdout, key=key)
+        progress("looking", 1, 4)
+        return FakeDiagnosis(verdict=verdict)
+
+    monkeypatch.setattr("jfsm.diagnosis.diagnose", quick)
+    return seen
+
+
+def test_help_names_every_command():
+    result = run("--help")
+    assert result.exit_code == 0
+    for name in ("inspect", "simulate", "fit", "diagnose", "causes", "demo"):
+        assert name in result.stdout
+
+
+def test_a_record_is_inspected_in_the_units_that_are_given(channels):
+    result = run("inspect", *channels)
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert "500 samples" in result.stdout
+    assert "displacement 1" in flat(result.stdout) or "displac" in result.stdout
+
+
+def test_a_rate_stands_for_a_clock(tmp_path):
+    np.savez(tmp_path / "run.npz", u=np.sin(np.arange(100.0)), y=np.cos(np.arange(100.0)))
+    result = run("inspect", tmp_path / "run.npz", "--force", "u", "--displacement", "y", "--rate", 610.35)
+    assert result.exit_code == 0
+    assert "610.35 Hz" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("names", "dofs"),
+    [
+        (["1=a", "2=b"], {1: "a", 2: "b"}),
+        (["3=a", "1=b"], {3: "a", 1: "b"}),
+        (["a", "b"], {1: "a", 2: "b"}),
+        (["b"], {1: "b"}),
+    ],
+)
+def test_several_degrees_of_freedom_are_numbered_or_in_their_order(names, dofs, folder, tmp_path, monkeypatch):
+    time = np.arange(100) / RATE
+    waves = {"a": np.sin(9 * time), "b": np.cos(7 * time)}
+    np.savez(tmp_path / "run.npz", t=time, a=waves["a"], b=waves["b"])
+    seen = answer(monkeypatch)
+    options = [part for name in names for part in ("--displacement", name)]
+    assert run("diagnose", tmp_path / "run.npz", *options, "--model", folder / "model.toml").exit_code == 0
+    assert list(seen["record"].channels) == [("displacement", dof) for dof in sorted(dofs)]
+    for dof, name in dofs.items():
+        np.testing.assert_array_equal(seen["record"].channels["displacement", dof], waves[name])
+
+
+def test_every_kind_of_channel_has_its_option(folder, tmp_path, monkeypatch):
+    time = np.arange(100) / RATE
+    kinds = ("force", "displacement", "velocity", "acceleration")
+    header = ",".join(["clock", "base", *(f"my_{kind}" for kind in kinds)])
+    columns = [time, np.sin(time), *(np.sin(i + time) for i in range(len(kinds)))]
+    np.savetxt(tmp_path / "run.csv", np.column_stack(columns), "%.17g", ",", header=header, comments="")
+    seen = answer(monkeypatch)
+    options = [part for kind in kinds for part in (f"--{kind}", f"my_{kind}")]
+    more = ["--base-acceleration", "base", "--time", "clock", "--at-rest"]
+    assert run("diagnose", tmp_path / "run.csv", *options, *more, "--model", folder / "model.toml").exit_code == 0
+    record = seen["record"]
+    assert record.at_rest
+    np.testing.assert_array_equal(record.time, time)
+    np.testing.assert_array_equal(record.base_acceleration, np.sin(time))
+    for i, kind in enumerate(kinds):
+        np.testing.assert_array_equal(record.channels[kind, 1], np.sin(i + time))
+
+
+@pytest.mark.parametrize(
+    ("verdict", "code"), [("consistent", 0), ("parameters", 1), ("cause", 1), ("unnamed", 1), ("undecided", 1)]
+)
+def test_only_a_consistent_model_ends_with_zero(verdict, code, channels, folder, monkeypatch):
+    answer(monkeypatch, verdict)
+    result = run("diagnose", *channels, "--model", folder / "model.toml")
+    assert (result.exit_code, result.stdout, result.stderr) == (code, f"verdict: {verdict}\n", "")
+
+
+@pytest.mark.parametrize(("text", "held"), [("none", None), ("0.2", 0.2)])
+def test_what_is_held_out_is_a_share_or_nothing(text, held, channels, folder, monkeypatch):
+    seen = answer(monkeypatch)
+    assert run("diagnose", *channels, "--model", folder / "model.toml", "--holdout", text).exit_code == 0
+    assert seen["holdout"] == held
+
+
+def test_a_second_file_is_held_out_with_the_channels_of_the_first(channels, folder, tmp_path, monkeypatch):
+    other = tmp_path / "other.csv"
+    other.write_text("\n".join((folder / "run.csv").read_text().splitlines()[:101]))
+    seen = answer(monkeypatch)
+    assert run("diagnose", *channels, "--model", folder / "model.toml", "--holdout", other).exit_code == 0
+    assert len(seen["holdout"]) == 100
+    np.testing.assert_array_equal(seen["holdout"].displacement, seen["record"].displacement[:100])
+
+
+def test_a_seed_is_passed_on_and_none_is_made_up(channels, folder, monkeypatch):
+    import jax
+
+    seen = answer(monkeypatch)
+    run("diagnose", *channels, "--model", folder / "model.toml")
+    assert seen["key"] is None
+    run("diagnose", *channels, "--model", folder / "model.toml", "--key", 7)
+    assert seen["key"] == jax.random.key(7)
+
+
+def test_a_bar_is_shown_on_a_terminal_only(channels, folder, monkeypatch):
+    answer(monkeypatch)
+    assert run("diagnose", *channels, "--model", folder / "model.toml").stderr == ""
+    monkeypatch.setenv("TTY_COMPATIBLE", "1")
+    shown = run("diagnose", *channels, "--model", folder / "model.toml")
+    assert "1/4" in shown.stderr and "looking" in shown.stderr
+    assert shown.stdout == "verdict: consistent\n"
+
+
+def test_an_interrupted_diagnosis_says_so_and_leaves_no_file(channels, folder, tmp_path, monkeypatch):
+    def interrupted(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("jfsm.diagnosis.diagnose", interrupted)
+    outputs = ["--report", tmp_path / "page.html", "--json", tmp_path / "d.json"]
+    result = run("diagnose", *channels, "--model", folder / "model.toml", *outputs)
+    assert result.exit_code == 3
+    assert result.stderr == "jfsm: Stopped before the end; no file was left half written.\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_mistake_of_the_library_is_not_taken_for_bad_input(channels, folder, monkeypatch):
+    def broken(*arguments, **options):
+        raise TypeError("unsupported operand")
+
+    monkeypatch.setattr("jfsm.diagnosis.diagnose", broken)
+    result = run("diagnose", *channels, "--model", folder / "model.toml")
+    assert isinstance(result.exception, TypeError)
+
+
+def test_a_missing_record_is_named(folder):
+    text = refusal("inspect", folder / "gone.csv", "--displacement", "y")
+    assert text == f"jfsm: No such file or directory: {folder / 'gone.csv'}"
+
+
+def test_an_unknown_channel_is_named_beside_those_that_exist(folder):
+    text = refusal("inspect", folder / "run.csv", "--displacement", "Y")
+    assert "`displacement` must name a channel of run.csv, which holds 't', 'u', 'y'; it was 'Y'" in text
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--displacement", "1=y", "--displacement", "u"], "--displacement must give each degree of freedom once"),
+        (["--displacement", "1=y", "--displacement", "1=u"], "as 1=x1 and 2=x2, or none at all; it was 1=y, 1=u."),
+        (["--displacement", "y", "--unit", "mm"], "--unit must be a channel and its unit, as y=mm; it was 'mm'."),
+        (["--displacement", "y", "--unit", "=mm"], "--unit must be a channel and its unit, as y=mm; it was 'mm'."),
+        (["--displacement", "y", "--unit", "y=parsec"], "it was 'parsec'"),
+        (["--displacement", "0=y"], "dof"),
+        ([], "must be told which channel is what"),
+    ],
+)
+def test_channel_options_that_mean_nothing_are_refused(options, words, folder):
+    assert words in refusal("inspect", folder / "run.csv", *options)
+
+
+def test_numbers_that_are_none_are_refused(tmp_path):
+    np.savez(tmp_path / "run.npz", t=np.arange(40.0), y=np.array(["a"] * 40))
+    assert f"{tmp_path / 'run.npz'}: " in refusal("inspect", tmp_path / "run.npz", "--displacement", "y")
+
+
+@pytest.mark.parametrize(
+    ("toml", "words"),
+    [
+        ("mass = [1.0", "is not a TOML file"),
+        ("stiffness = 3.0", "unknown entry 'stiffness'"),
+        ('mass = ["heavy"]', "`mass` must hold real numbers"),
+        ('mass = [1.0]\n[[term]]\nkind = "spring"\nat = [0, 1]\nk = 3.0', "`kind` must be one of stiffness"),
+    ],
+)
+def test_a_model_file_that_holds_no_model_is_refused(toml, words, channels, tmp_path):
+    model = tmp_path / "model.toml"
+    model.write_text(toml)
+    text = refusal("diagnose", *channels, "--model", model)
+    assert words in text and str(model) in text
+
+
+def test_a_missing_model_file_is_named(channels, tmp_path):
+    text = refusal("diagnose", *channels, "--model", tmp_path / "gone.toml")
+    assert f"There is no model file {tmp_path / 'gone.toml'}" in text
+
+
+def test_a_model_is_asked_for():
+    result = run("diagnose", "run.csv")
+    assert result.exit_code == 2
+    assert "--model" in result.stderr
+
+
+def test_a_holdout_that_is_neither_share_nor_file_is_refused(channels, folder):
+    text = refusal("diagnose", *channels, "--model", folder / "model.toml", "--holdout", "some")
+    assert "--holdout must be a share such as 0.3, a file, or none; it was 'some'." in text
+    text = refusal("diagnose", *channels, "--model", folder / "model.toml", "--holdout", "1.5")
+    assert "`holdout` as a share must lie between 0 and 1" in text
+
+
+@pytest.mark.parametrize(
+    ("command", "option", "name"),
+    [
+        ("simulate", "--out", "run.csv"),
+        ("fit", "--out", "model.toml"),
+        ("diagnose", "--report", "run.csv"),
+        ("diagnose", "--json", "model.toml"),
+        ("diagnose", "--extended", "model.toml"),
+        ("diagnose", "--report", "second.csv"),
+    ],
+)
+def test_no_input_is_written_over(command, option, name, channels, folder):
+    second = folder / "second.csv"
+    second.write_bytes((folder / "run.csv").read_bytes())
+    before = (folder / name).read_bytes()
+    more = ["--holdout", second] if command == "diagnose" else []
+    through = folder / "." / ".." / folder.name / name  # another way to write the same place
+    text = refusal(command, *channels, "--model", folder / "model.toml", *more, option, through)
+    assert f"{option} must not be a file that is needed: {through} is an input of this command." in text
+    assert (folder / name).read_bytes() == before
+
+
+def test_two_outputs_cannot_share_a_file(channels, folder, tmp_path):
+    both = tmp_path / "out"
+    text = refusal("diagnose", *channels, "--model", folder / "model.toml", "--report", both, "--json", both)
+    assert f"--json must not be a file that is needed: {both} is --report already." in text
+
+
+def test_an_output_needs_a_folder_before_anything_is_computed(channels, folder, tmp_path):
+    for target in (tmp_path / "gone" / "page.html", tmp_path):
+        text = refusal("diagnose", *channels, "--model", folder / "model.toml", "--report", target)
+        assert f"--report must be a file in a folder that exists; it was {target}." in text
+
+
+def test_a_simulated_motion_reads_back_as_a_record(channels, folder, tmp_path):
+    out = tmp_path / "motion.npz"
+    result = run("simulate", *channels, "--at-rest", "--model", folder / "model.toml", "--out", out)
+    assert (result.exit_code, result.stderr) == (0, "")
+    motion, seen = read(out), read(folder / "run.csv", force="u", displacement="y", units={"y": "mm"})
+    assert list(motion.channels) == [(kind, 1) for kind in ("force", "displacement", "velocity", "acceleration")]
+    assert motion.at_rest and motion.units["displacement"] == "m"
+    assert motion.displacement is not None and seen.displacement is not None
+    error = np.std(motion.displacement - seen.displacement) / np.std(seen.displacement)
+    assert error < 0.03  # 1 % noise on the displacement and on the force that drives it
+
+
+def test_a_motion_that_runs_away_is_not_written(folder, channels, tmp_path):
+    (tmp_path / "model.toml").write_text(
+        'mass = [2.0]\n[[term]]\nkind = "stiffness"\nat = [0, 1]\nk = 1800.0\n'
+        '[[term]]\nkind = "damping"\nat = [0, 1]\nc = -300.0\n'
+    )
+    result = run("simulate", *channels, "--model", tmp_path / "model.toml", "--out", tmp_path / "motion.csv")
+    assert result.exit_code == 3
+    assert "s the simulated motion left every bound" in result.stderr and "Nothing was written." in result.stderr
+    assert not (tmp_path / "motion.csv").exists()
+
+
+def test_a_fit_is_printed_with_intervals_and_written_as_a_model(channels, folder, tmp_path):
+    out = tmp_path / "fitted.toml"
+    given = Structure.load(folder / "stiff.toml").values()
+    result = run("fit", *channels, "--at-rest", "--model", folder / "stiff.toml", "--out", out, "--fixed", "mass")
+    assert (result.exit_code, result.stderr) == (0, "")
+    fitted = Structure.load(out).values()
+    assert fitted["mass@1"] == given["mass@1"]
+    assert fitted["stiffness@0-1.k"] == pytest.approx(STIFFNESS, rel=0.01)
+    assert "stiffness@0-1.k" in result.stdout and "N/m" in result.stdout and "mass@1" not in result.stdout
+
+
+def test_a_name_that_cannot_be_fixed_is_refused(channels, folder, tmp_path):
+    text = refusal(
+        "fit", *channels, "--model", folder / "model.toml", "--out", tmp_path / "fitted.toml", "--fixed", "colour"
+    )
+    assert "`fixed` names 'colour', which the structure does not have" in text
+    assert not (tmp_path / "fitted.toml").exists()
+
+
+def test_a_model_that_is_right_and_one_that_is_too_stiff_are_told_apart(channels, folder, tmp_path):
+    right = run("diagnose", *channels, "--at-rest", "--model", folder / "model.toml", "--key", 1)
+    assert (right.exit_code, right.stderr) == (0, ""), right.output
+    page, numbers, mended = (tmp_path / name for name in ("page.html", "d.json", "mended.toml"))
+    page.write_text("of yesterday")
+    outputs = ["--report", page, "--json", numbers, "--extended", mended]
+    wrong = run("diagnose", *channels, "--at-rest", "--model", folder / "stiff.toml", "--key", 1, *outputs)
+    assert (wrong.exit_code, wrong.stderr) == (1, ""), wrong.output
+    assert json.loads(numbers.read_text(encoding="utf-8"))["verdict"] == "parameters"
+    assert page.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    assert Structure.load(mended).values()["stiffness@0-1.k"] == pytest.approx(STIFFNESS, rel=0.02)
+
+
+def test_a_mended_model_that_is_a_map_is_not_written_but_the_finding_stands(channels, folder, tmp_path, monkeypatch):
+    def no_table(path):
+        raise ValueError("A structure with a map cannot be written as TOML.")
+
+    found = FakeDiagnosis(verdict="unnamed", extended=SimpleNamespace(save=no_table))
+    monkeypatch.setattr("jfsm.diagnosis.diagnose", lambda *arguments, **options: found)
+    result = run("diagnose", *channels, "--model", folder / "model.toml", "--extended", tmp_path / "mended.toml")
+    assert result.exit_code == 1
+    assert result.stderr == "jfsm: --extended was not written. A structure with a map cannot be written as TOML.\n"
+
+
+def test_causes_are_listed_with_their_parameters():
+    from jfsm import causes
+
+    result = run("causes")
+    assert result.exit_code == 0
+    for name, cause in causes().items():
+        (row,) = (line for line in result.stdout.splitlines() if line.split()[:1] == [name])
+        assert cause.effect.parameters[0].name in row.split()
+
+
+def test_a_demonstration_does_not_write_over_its_data(folder):
+    before = (folder / "run.csv").read_bytes()
+    text = refusal("demo", "--data", folder / "run.csv", "--report", folder / "run.csv")
+    assert "--report must not be a file that is needed" in text
+    assert (folder / "run.csv").read_bytes() == before
+
+
+def test_a_demonstration_names_the_channel_that_its_data_lack(folder, tmp_path):
+    text = refusal("demo", "--data", folder / "run.csv", "--displacement", "x", "--report", tmp_path / "page.html")
+    assert "`displacement` must name a channel of run.csv" in text
+
+
+def test_a_demonstration_ends_with_zero_and_says_where_its_page_is(tmp_path, monkeypatch):
+    seen: dict[str, Any] = {}
+
+    def quick(record, model, holdout, key, progress):
+        seen.update(record=record, holdout=holdout)
+        return FakeDiagnosis(verdict="cause", report=lambda path: Path(path).write_text("page"))
+
+    monkeypatch.setattr("jfsm.diagnosis.diagnose", quick)
+    monkeypatch.chdir(tmp_path)
+    result = run("demo")
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert f"The page is {tmp_path / 'jfsm-demo.html'}." in result.stdout
+    assert (tmp_path / "jfsm-demo.html").read_text() == "page"
+    before, _, after = result.stdout.partition("verdict: cause")
+    assert "Coulomb" not in before and "Coulomb friction of" in after
+    assert isinstance(seen["record"], Record) and seen["holdout"] == 0.3
+
+
+def test_a_process_needs_no_setting_beforehand(channels, folder, tmp_path):
+    environment = {name: value for name, value in os.environ.items() if name != "JAX_ENABLE_X64"}
+    out = tmp_path / "motion.csv"
+    words = ["simulate", *channels, "--at-rest", "--model", folder / "model.toml", "--out", out]
+    finished = subprocess.run(
+        [sys.executable, "-m", "jfsm.cli", *map(str, words)],
+        capture_output=True, text=True, env=environment, cwd=Path(__file__).resolve().parents[1],
+    )  # fmt: skip
+    assert (finished.returncode, finished.stderr) == (0, "")
+    assert len(read(out)) == SAMPLES

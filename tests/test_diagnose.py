@@ -1,0 +1,180 @@
+"""From a record and a model to a verdict, on data that SciPy made."""
+
+import json
+
+import jax
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import jfsm
+from jfsm.identification import _likelihood
+
+MASS, STIFFNESS, DAMPING, CUBIC = 2.0, 18.0, 0.5, 4.0
+SAMPLES, STEP = 900, 0.05
+
+
+def made(
+    restoring, noise=0.005, samples=SAMPLES, channels=("displacement", "velocity", "acceleration"), gain=1.0, seed=3
+):
+    """A noisy record from rest of MASS a + restoring(x, v) = g."""
+    rng = np.random.default_rng(seed)
+    omegas, phases = rng.uniform(0.5, 7.0, 12), rng.uniform(0, 2 * np.pi, 12)
+
+    def force(t):
+        return 2.0 * np.cos(np.multiply.outer(t, omegas) + phases).sum(-1)
+
+    time = np.arange(samples) * STEP
+    x, v = solve_ivp(
+        lambda t, y: [y[1], (force(t) - restoring(*y)) / MASS],
+        (0, time[-1]),
+        [0, 0],
+        t_eval=time,
+        rtol=1e-10,
+        atol=1e-12,
+    ).y
+    clean = {"displacement": x, "velocity": v, "acceleration": gain * (force(time) - restoring(x, v)) / MASS}
+    kept = {"force": force(time)} | {kind: clean[kind] for kind in channels}
+    noisy = {kind: y + noise * y.std() * rng.standard_normal(samples) for kind, y in kept.items()}
+    return jfsm.Record(time, **noisy, at_rest=True)
+
+
+def linear(x, v):
+    return STIFFNESS * x + DAMPING * v
+
+
+def duffing(x, v):
+    return linear(x, v) + CUBIC * x**3
+
+
+@pytest.fixture(scope="module")
+def believed():
+    return jfsm.Structure.sdof(MASS, 1.01 * STIFFNESS, 0.9 * DAMPING)
+
+
+@pytest.fixture(scope="module")
+def hidden_cubic(believed):
+    return jfsm.diagnose(made(duffing), believed, key=jax.random.key(0))
+
+
+def test_a_hidden_cubic_spring_is_named_with_its_place_and_value(hidden_cubic):
+    assert hidden_cubic.verdict == "cause"
+    (finding,) = hidden_cubic.findings
+    assert (finding.cause, finding.family, finding.at) == ("cubic_hardening", "stiffness", (0, 1))
+    estimate = finding.parameters["k3"]
+    assert estimate.low <= CUBIC <= estimate.high
+    assert estimate.value == pytest.approx(CUBIC, rel=0.03)
+    assert estimate.unit == "N/m^3"
+    assert finding.probability > 0.95
+
+
+def test_the_extended_model_closes_what_can_be_closed_on_held_out_readings(hidden_cubic):
+    gain = hidden_cubic.gain
+    assert gain.closed > 0.95
+    assert gain.after < gain.refitted < gain.before
+    assert hidden_cubic.extended.values()["cubic_stiffness@0-1.k3"] == pytest.approx(CUBIC, rel=0.03)
+
+
+def test_own_values_are_refitted_beside_the_finding(hidden_cubic):
+    assert hidden_cubic.refitted["stiffness@0-1.k"].value == pytest.approx(STIFFNESS, rel=0.01)
+    assert hidden_cubic.refitted["mass@1"].value == pytest.approx(MASS, rel=0.01)
+
+
+def test_every_candidate_but_the_named_one_says_why_it_lost(hidden_cubic):
+    assert {c.cause for c in hidden_cubic.candidates} == set(jfsm.causes())
+    for candidate in hidden_cubic.candidates:
+        assert candidate.why
+        assert (candidate.why == "named") == (candidate.cause == "cubic_hardening")
+
+
+def test_the_verdict_is_written_as_json_and_as_a_page(hidden_cubic, tmp_path):
+    hidden_cubic.to_json(tmp_path / "d.json")
+    hidden_cubic.report(tmp_path / "d.html")
+    data = json.loads((tmp_path / "d.json").read_text())
+    assert data["verdict"] == "cause"
+    assert data["findings"][0]["parameters"]["k3"]["value"] == hidden_cubic.findings[0].parameters["k3"].value
+    assert set(data["curves"]) == {"holdout", "residual", "map", "law"}
+    assert data["curves"]["map"] is not None
+    page = (tmp_path / "d.html").read_text()
+    assert "cubic" in page
+    assert "http" not in page.replace("http://www.w3.org", "")
+
+
+def test_the_same_key_gives_the_same_answer(hidden_cubic, believed):
+    again = jfsm.diagnose(made(duffing), believed, key=jax.random.key(0))
+    assert again.data == hidden_cubic.data
+
+
+def test_a_right_model_is_left_as_it_is():
+    right = jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING) + jfsm.CubicStiffness(CUBIC, at=(0, 1))
+    d = jfsm.diagnose(made(duffing), right, holdout=None)
+    assert d.verdict == "consistent"
+    assert d.findings == ()
+    assert d.gain is None
+    assert d.extended.values() == right.values()
+
+
+def test_a_wrong_stiffness_is_a_parameter_and_no_cause():
+    d = jfsm.diagnose(made(linear), jfsm.Structure.sdof(MASS, 1.2 * STIFFNESS, DAMPING), key=jax.random.key(0))
+    assert d.verdict == "parameters"
+    assert [f.cause for f in d.findings] == ["stiffness_value"]
+    assert d.findings[0].at == (0, 1)
+    assert d.findings[0].parameters["k"].value == pytest.approx(STIFFNESS, rel=0.01)
+
+
+def test_a_gain_error_of_the_accelerometer_is_found_where_it_sits():
+    d = jfsm.diagnose(made(linear, gain=1.1), jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING), key=jax.random.key(0))
+    assert d.verdict == "cause"
+    assert (d.findings[0].cause, d.findings[0].at) == ("accel_gain", ("acceleration", 1))
+    assert d.findings[0].parameters["eps"].value == pytest.approx(0.1, abs=0.01)
+
+
+def test_a_law_outside_the_catalogue_gets_no_name_and_a_map_that_runs():
+    def stop(x, v):
+        return linear(x, v) + 60.0 * np.maximum(x - 0.4, 0.0)
+
+    record = made(stop, samples=1800)
+    d = jfsm.diagnose(record, jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING), key=jax.random.key(0))
+    assert d.verdict in ("unnamed", "undecided")
+    assert d.findings == ()
+    if d.verdict == "unnamed":
+        assert d.gain is not None
+        assert d.gain.after < 0.7 * d.gain.before
+
+
+def test_laws_of_a_class_share_one_program(believed, monkeypatch):
+    traced = []
+    original = _likelihood._run
+    monkeypatch.setattr(_likelihood, "_run", lambda *a: traced.append(1) or original(*a))
+    jax.clear_caches()
+    jfsm.diagnose(made(duffing, samples=400), believed, key=jax.random.key(0))
+    # One program with derivatives and one without, for smooth laws and for friction: no other place, sign or law.
+    assert 0 < len(traced) <= 4
+    traced.clear()
+    jfsm.diagnose(made(duffing, samples=390, seed=5), believed, key=jax.random.key(0))
+    assert not traced
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"holdout": 1.5}, "`holdout` as a share must lie between 0 and 1"),
+        ({"causes": ["rust"]}, "`causes` must name causes of the catalogue"),
+        ({"max_causes": 0}, "`max_causes` must be at least 1; got 0"),
+    ],
+)
+def test_arguments_out_of_range_are_refused_by_name(believed, arguments, message):
+    with pytest.raises(ValueError, match=message):
+        jfsm.diagnose(made(linear, samples=100), believed, **arguments)
+
+
+def test_records_without_response_or_too_short_are_refused(believed):
+    record = made(linear, samples=100)
+    with pytest.raises(ValueError, match="`record` must hold a response"):
+        jfsm.diagnose(jfsm.Record(record.time, record.force), believed)
+    with pytest.raises(ValueError, match="at least 32 samples"):
+        jfsm.diagnose(record[:20], believed)
+    with pytest.raises(ValueError, match="sequence is empty"):
+        jfsm.diagnose([], believed)
+    with pytest.raises(TypeError, match="must be a jfsm.Record"):
+        jfsm.diagnose([record.time], believed)  # pyright: ignore[reportArgumentType]
