@@ -6,6 +6,7 @@ Whatever is slow to import is imported by the command that needs it.
 
 import functools
 import re
+import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -56,7 +57,11 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
 
             jax.config.update("jax_enable_x64", True)
             function(**options)
+        except BrokenPipeError:  # whoever read the output has seen enough; typer ends such a process in silence
+            raise
         except (ValueError, OSError) as error:
+            if not _is_refusal(error):
+                raise
             _say(_words(error))
             raise typer.Exit(BAD_INPUT) from None
         except KeyboardInterrupt:
@@ -100,7 +105,7 @@ class RecordFile:
                 units=_units(self.unit),
                 at_rest=self.at_rest or None,  # without the option, what the file says
             )
-        except TypeError as error:  # from what a file holds; a TypeError of any later step is a mistake of ours
+        except TypeError as error:  # from what the file holds; a TypeError of any later step is a mistake of ours
             raise ValueError(f"{self.record}: {error}") from error
 
 
@@ -212,7 +217,6 @@ def diagnose(
     record, held, believed = source.read(), _holdout(holdout, source), _load(model)
     with _progress() as tell:
         d = diagnose(record, believed, holdout=held, key=_key(key), progress=tell)
-    d.print()
     if report is not None:
         d.report(report)
     if json is not None:
@@ -222,6 +226,7 @@ def diagnose(
             d.extended.save(extended)
         except ValueError as error:  # a map stands in, and TOML holds none: what was found stands nevertheless
             _say(f"--extended was not written. {error}")
+    d.print()  # last, so that a reader who closes the pipe loses no file
     if d.verdict != "consistent":
         raise typer.Exit(FOUND)
 
@@ -263,10 +268,10 @@ def demo(
             shown = measured(data, force=force, displacement=displacement, units=_units(unit), rate=rate)
         typer.echo(shown.introduction + "\n")
         d = diagnose(shown.record, shown.model, holdout=shown.holdout, key=_key(key), progress=tell)
+    d.report(report)
     d.print()
     if shown.hidden is not None:
         typer.echo(shown.hidden)
-    d.report(report)
     typer.echo(f"The page is {report.resolve()}.")
 
 
@@ -314,6 +319,15 @@ def _table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -
 def _say(message: str) -> None:
     """One paragraph on standard error."""
     typer.echo(f"jfsm: {' '.join(message.split())}", err=True)
+
+
+def _is_refusal(error: Exception) -> bool:
+    """Whether an error is about the input: of the operating system, or raised by jfsm in words.
+
+    A ValueError from a library underneath is a mistake of jfsm, whose traceback is wanted.
+    """
+    *_, (frame, _) = traceback.walk_tb(error.__traceback__)
+    return isinstance(error, OSError) or frame.f_globals["__spec__"].name.split(".")[0] == "jfsm"
 
 
 def _words(error: Exception) -> str:

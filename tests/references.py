@@ -11,7 +11,7 @@ MOST_EVENTS = 500
 
 
 def smooth_motion(
-    mass, law: Law, force: Force, time: np.ndarray, x0, v0, tolerance: float = 1e-11
+    mass, law: Law, force: Force, time: np.ndarray, x0, v0, tolerance: float = 1e-9
 ) -> tuple[np.ndarray, np.ndarray]:
     """Displacement and velocity (n, dof) of ``mass a + law(x, v) = force(t)``.
 
@@ -37,7 +37,17 @@ def smooth_motion(
 
 
 def sticking_motion(
-    mass, damping, stiffness, links, limits, force: Force, time: np.ndarray, x0, v0, law: Law | None = None
+    mass,
+    damping,
+    stiffness,
+    links,
+    limits,
+    force: Force,
+    time: np.ndarray,
+    x0,
+    v0,
+    law: Law | None = None,
+    tolerance=1e-8,
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """Displacement and velocity (n, dof) with Coulomb friction that sticks, and the number of events.
 
@@ -89,8 +99,8 @@ def sticking_motion(
             state,
             method="DOP853",
             events=[ends(link, mode) for link in range(len(limits))],
-            rtol=1e-10,
-            atol=1e-12,
+            rtol=tolerance,
+            atol=tolerance / 100,
             dense_output=True,
             max_step=0.1,
         )

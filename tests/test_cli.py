@@ -1,5 +1,6 @@
 """The command line: what it prints, what it writes, and the code it ends with."""
 
+import errno
 import json
 import math
 import os
@@ -203,13 +204,12 @@ def test_an_interrupted_diagnosis_says_so_and_leaves_no_file(channels, folder, t
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_mistake_of_the_library_is_not_taken_for_bad_input(channels, folder, monkeypatch):
-    def broken(*arguments, **options):
-        raise TypeError("unsupported operand")
-
-    monkeypatch.setattr("jfsm.diagnosis.diagnose", broken)
+@pytest.mark.parametrize("mistake", [lambda: "a" + 1, lambda: np.ones(3) + np.ones(2)])  # pyright: ignore
+def test_a_mistake_of_the_library_is_not_taken_for_bad_input(mistake, channels, folder, monkeypatch):
+    monkeypatch.setattr("jfsm.diagnosis.diagnose", lambda *arguments, **options: mistake())
     result = run("diagnose", *channels, "--model", folder / "model.toml")
-    assert isinstance(result.exception, TypeError)
+    assert result.exit_code == 1 and isinstance(result.exception, TypeError | ValueError)
+    assert "jfsm:" not in result.stderr
 
 
 def test_a_missing_record_is_named(folder):
@@ -236,6 +236,13 @@ def test_an_unknown_channel_is_named_beside_those_that_exist(folder):
 )
 def test_channel_options_that_mean_nothing_are_refused(options, words, folder):
     assert words in refusal("inspect", folder / "run.csv", *options)
+
+
+@pytest.mark.parametrize("name", ["run.npz", "run.mat", "run.csv"])
+@pytest.mark.parametrize("content", [b"", b"nonsense", b"PK\x03\x04nonsense"])
+def test_a_damaged_record_is_refused_in_words(name, content, tmp_path):
+    (tmp_path / name).write_bytes(content)
+    assert f"{name} must " in refusal("inspect", tmp_path / name, "--displacement", "y")
 
 
 def test_numbers_that_are_none_are_refused(tmp_path):
@@ -415,6 +422,20 @@ def test_a_demonstration_ends_with_zero_and_says_where_its_page_is(tmp_path, mon
     before, _, after = result.stdout.partition("verdict: cause")
     assert "Coulomb" not in before and "Coulomb friction of" in after
     assert isinstance(seen["record"], Record) and seen["holdout"] == 0.3
+
+
+def test_a_reader_who_leaves_early_costs_no_file_and_gets_no_complaint(channels, folder, tmp_path, monkeypatch):
+    def leave():
+        raise BrokenPipeError(errno.EPIPE, "Broken pipe")
+
+    def numbers(path):
+        path.write_text("{}")
+
+    found = SimpleNamespace(verdict="consistent", print=leave, to_json=numbers)
+    monkeypatch.setattr("jfsm.diagnosis.diagnose", lambda *arguments, **options: found)
+    result = run("diagnose", *channels, "--model", folder / "model.toml", "--json", tmp_path / "d.json")
+    assert (result.exit_code, result.stderr) == (1, "")
+    assert (tmp_path / "d.json").exists()
 
 
 def test_a_process_needs_no_setting_beforehand(channels, folder, tmp_path):

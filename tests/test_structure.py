@@ -156,7 +156,11 @@ SPRING = jfsm.LinearStiffness(1.0, at=(0, 1))
         (lambda: jfsm.Structure([1.0], [jfsm.Coulomb(1.0, at=(1, 2))]), ValueError, r"\(1, 2\) of coulomb names a deg"),
         (lambda: jfsm.Structure([1.0]) + Offset(1.0, at=("force", 2)), ValueError, "of offset names a degree of free"),
         (lambda: jfsm.Structure([1.0]) + 3.0, TypeError, "unsupported operand"),  # pyright: ignore[reportOperatorIssue]
-        (lambda: jfsm.Structure.chain([1, 1], [1.0]), ValueError, r"`stiffness` must have one value per mass \(2\); go"),
+        (
+            lambda: jfsm.Structure.chain([1, 1], [1.0]),
+            ValueError,
+            r"`stiffness` must have one value per mass \(2\); go",
+        ),
         (lambda: jfsm.Structure.chain([1], [1], [1, 2]), ValueError, r"`damping` must have one value per mass \(1\)"),
         (lambda: SPRING.__class__(1.0, at=(1, 1)), ValueError, r"`at` must name two different degrees of freedom"),
         (lambda: SPRING.__class__(1.0, at=(-1, 1)), ValueError, r"`at` must name two different degrees of freedom"),
@@ -169,9 +173,17 @@ SPRING = jfsm.LinearStiffness(1.0, at=(0, 1))
         (lambda: jfsm.Coulomb(-1.0, at=(0, 1)), ValueError, "`F` of Coulomb friction must not be negative .* got -1"),
         (lambda: ForceGain(0.1, at=("displacement", 1)), ValueError, r"`at` of force_gain must be \(force, degree"),
         (lambda: AccelerationGain(0.1, at=("acceleration", 0)), ValueError, "degree of freedom from 1"),
-        (lambda: Offset(0.1, at=("strain", 1)), ValueError, "`at` of offset must be .force or displacement or velocity"),
+        (
+            lambda: Offset(0.1, at=("strain", 1)),
+            ValueError,
+            "`at` of offset must be .force or displacement or velocity",
+        ),
         (lambda: Offset(0.1, at=("force", 1.5)), ValueError, r"`at` of a sensor effect must be \(kind, degree"),
-        (lambda: full().with_values({"mass@9": 1.0}), ValueError, "'mass@9' names no parameter of this structure; it h"),
+        (
+            lambda: full().with_values({"mass@9": 1.0}),
+            ValueError,
+            "'mass@9' names no parameter of this structure; it h",
+        ),
         (lambda: full().with_values({"mass@1": -1.0}), ValueError, "`mass` must hold at least one mass, none negative"),
         (lambda: full().with_values({"coulomb@1-2.F": -1.0}), ValueError, "`F` of Coulomb friction must not be negat"),
         (lambda: full().with_values({"damping@0-1.c": np.nan}), ValueError, "A parameter must be finite; got nan"),

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 
 from ..identification import (
     Hypothesis,
@@ -120,17 +121,17 @@ def hypothesis(
     records: Sequence[Nuisances],
     *,
     refit: bool = True,
-    begin: Mapping[str, float] | None = None,
+    begins: Sequence[Mapping[str, float] | None] = (),
 ) -> Hypothesis:
     """Starts with their unknowns: the model's own values, the effect's numbers, and each record's nuisances.
 
-    `begin` holds own values to start from, where they differ from the model's.
+    `begins` holds the own values of each start, where they differ from the model's.
     """
     structures, unknowns = [], []
     trust = dict(model.trust)
     given = set(model.entries())
     own = own_paths(model, records) if refit else ()
-    for start in starts:
+    for start, begin in zip_longest(starts, begins):
         effect = [p for p in start.entries() if p not in given]
         structure = with_offsets(start, records)
         mine: list[Unknown] = [own_unknown(structure, p, trust) for p in own]

@@ -17,7 +17,7 @@ from ._diagnosis import Diagnosis
 from ._gain import measure_gain
 from ._report import assemble
 from ._residual import residual, stand_in
-from ._search import fit_model, groups, search
+from ._search import fit_model, search
 from ._trial import Trial
 
 Progress = Callable[[str, int, int], None]
@@ -77,7 +77,7 @@ def diagnose(
     until = [fit for _, fit in training]
     records = [prepare(r, model, reconstruction) for r in whole]
     tried = candidates(model, records, chosen, places)
-    steps = _Steps(progress, 4 + 2 * len(groups(tried)))
+    steps = _Steps(progress, 4)
 
     steps.next("the model as given")
     given = fit_model("given", model, records, until, refit=False)
@@ -101,14 +101,14 @@ def diagnose(
 
 
 class _Steps:
-    """Counts steps for a progress display."""
+    """Counts steps for a progress display; `more` steps may turn up on the way."""
 
     def __init__(self, progress: Progress | None, total: int):
         self.progress, self.done, self.total = progress, 0, total
 
-    def next(self, what: str) -> None:
+    def next(self, what: str, more: int = 0) -> None:
         if self.progress is not None:
-            self.progress(what, self.done, self.total)
+            self.progress(what, self.done, self.total + more)
         self.done += 1
 
 
@@ -140,6 +140,6 @@ def _noise_levels(winner: Trial, nuisances: Nuisances) -> dict[tuple, float]:
         c: float(f * math.exp(s / 2))
         for c, f, s in zip(nuisances.channels, nuisances.floor, winner.noise, strict=False)
     }
-    for j, variance in enumerate(nuisances.noise.force_variance):
+    for j, variance in enumerate(nuisances.force_variance):
         levels["force", j + 1] = math.sqrt(float(variance))
     return levels

@@ -40,7 +40,7 @@ def residual(trial: Trial, model: Structure, nuisances: Nuisances, until: int) -
     found = latent_force(
         plant, nuisances.show, nuisances.record.time, np.asarray(fine.force)[:n, 0], np.asarray(fine.base)[:n, 0],
         np.asarray(readings.values)[:n], np.asarray(readings.use)[:n],
-        readings.variance, nuisances.noise.force_variance, nuisances.omega, nuisances.length,
+        readings.variance, nuisances.force_variance, nuisances.omega, nuisances.length,
     )  # fmt: skip
     rows = np.array([direction(at, model.dof) for at in model.links])
     # Forces on degrees of freedom as forces on links: exact for a chain, least squares otherwise.

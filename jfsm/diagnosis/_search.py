@@ -1,6 +1,6 @@
 """Every hypothesis fitted: those that share a program side by side, the hopeless ones only so far."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -47,11 +47,21 @@ def fit_model(name: str, model: Structure, records: Sequence[Nuisances], until: 
     return trial(posterior, found, best, None, (name,), float(rung.value[0]))
 
 
-def groups(tried: Sequence[Candidate]) -> list[list[tuple[Candidate, Structure]]]:
-    """Starts that can share a program, in lots of its lanes: one law, whatever its sign and place."""
-    by_law: dict[type, list[tuple[Candidate, Structure]]] = {}
+Beginning = tuple[Candidate, Structure, Mapping[str, float] | None]
+"""A candidate, the structure with the size of its effect, and the own values to begin with (None: as given)."""
+
+
+def groups(tried: Sequence[Candidate], own: Mapping[str, float] | None) -> list[list[Beginning]]:
+    """Starts that can share a program, in lots of its lanes: one law, whatever its sign and place.
+
+    A law starts twice, from the own values as given and from those of the refit: either may be far from what is right
+    beside it. A gain lies on a ridge with the own values, and only a climb from those as given ends at its own end.
+    """
+    by_law: dict[type, list[Beginning]] = {}
     for candidate in tried:
-        by_law.setdefault(candidate.cause.effect, []).extend((candidate, s) for s in candidate.starts)
+        begins = [None] if candidate.cause.is_sensor or own is None else [None, own]
+        lot = by_law.setdefault(candidate.cause.effect, [])
+        lot += [(candidate, s, begin) for begin in begins for s in candidate.starts]
     lots = []
     for law, starts in by_law.items():
         lanes = 1 if issubclass(law, AbstractFriction) else LANES
@@ -66,19 +76,21 @@ def search(
     refitted: Trial,
     records: Sequence[Nuisances],
     until: Sequence[int],
-    tell: Callable[[str], None],
+    tell: Callable[[str, int], None],
 ) -> list[Trial]:
     """The best trial of every candidate; those far behind stay at the values of their rung."""
     approached = []
-    start = refitted.structure if refitted.evidence > given.evidence else model
-    for lot in groups(tried):
+    values = refitted.structure.values()
+    own = {p: values[p] for p in model.entries()} if refitted.evidence > given.evidence else None
+    lots = groups(tried, own)
+    for lot in lots:
         first = lot[0][0]
-        tell(f"{first.cause.label} at {'-'.join(map(str, first.at))}")
-        approached.append(_approach(lot, model, start, records, until))
+        tell(f"{first.cause.label} at {'-'.join(map(str, first.at))}", 2 * len(lots))
+        approached.append(_approach(lot, model, records, until))
     leader = min([refitted.rung, *(lot.best for lot in approached)])
     trials, best = [], refitted.value
     for rank, lot in enumerate(sorted(approached, key=lambda lot: lot.best)):
-        tell("the best candidates")
+        tell("the best candidates", 2 * len(lots))
         behind = lot.best - leader
         pursued = rank < _ALWAYS_PURSUED or behind < _FAR_BEHIND
         found = finish(lot.posterior, lot.rung, best=best) if pursued else lot.rung
@@ -92,14 +104,9 @@ def search(
     return _best_of_each(trials)
 
 
-def _approach(
-    lot: Sequence[tuple[Candidate, Structure]], model: Structure, start: Structure, records, until
-) -> _Approached:
-    candidates, starts = zip(*lot, strict=True)
-    # A gain lies on a ridge with the own values: only from the values as given does a climb end at its own end of it.
-    sensor = candidates[0].cause.is_sensor
-    own = None if sensor else {p: v for p, v in start.values().items() if p in model.entries()}
-    posterior = Posterior(hypothesis(model, starts, records, begin=own), records, until)
+def _approach(lot: Sequence[Beginning], model: Structure, records, until) -> _Approached:
+    candidates, starts, begins = zip(*lot, strict=True)
+    posterior = Posterior(hypothesis(model, starts, records, begins=begins), records, until)
     return _Approached(candidates, posterior, approach(posterior, _LADDER))
 
 

@@ -118,7 +118,8 @@ def simulate(
     stop = _escape(plant, fine, x, v, record, x0, v0)
     if stop is None and solver == "reference" and not friction:
         scale = jnp.maximum(jnp.std(jnp.asarray(x)), 1e-30)
-        xr, vr, done = run_reference(plant, fine, jnp.asarray(x0), jnp.asarray(v0), tolerance, scale)
+        start, within = (jnp.asarray(x0), jnp.asarray(v0)), jnp.asarray(tolerance, dtype=jnp.float64)
+        xr, vr, done = run_reference(plant, fine, *start, within, scale)
         if bool(done):
             x, v = np.asarray(xr)[: len(record)], np.asarray(vr)[: len(record)]
             a = _accelerations(plant, fine, x, v)

@@ -96,7 +96,8 @@ def _residuals(plant, show, fine, y, spread, state):
         x, v, a = run_grid.__wrapped__(plant, fine, state[:dof], state[dof:])
         shown = {"displacement": x, "velocity": v, "acceleration": a + fine.base[:, :1]}
         seen = jnp.stack([shown[kind] @ row for kind, row in zip(show.kinds, show.select, strict=True)], 1)
-        return (((1 + plant.channel_gain) * seen + plant.channel_offset - y) / spread).ravel()
+        shown_by_sensors = (1 + plant.channel_gain)[None, :] * seen + plant.channel_offset[None, :]
+        return ((shown_by_sensors - y) / spread[None, :]).ravel()
 
     jacobian = jax.vmap(partial(jax.jvp, residual, (state,)), out_axes=(None, 1))
     value, slope = jacobian((jnp.eye(2 * dof),))

@@ -90,16 +90,18 @@ def mode_at(plant: Plant, minv, x, v, g, t):
     if not len(plant.friction):
         return jnp.zeros(0)
     speed = jnp.sum(plant.friction.direction * v[None, :], 1)
-    return _from_rest(plant, minv, x, v, g, t, jnp.sign(speed))
+    return _from_rest(plant, minv, x, v, g, t, jnp.sign(speed), jnp.zeros(speed.shape, bool))
 
 
-def _from_rest(plant: Plant, minv, x, v, g, t, mode):
-    # Force needed to hold the links at rest while the others slide; beyond a limit a link breaks away.
+def _from_rest(plant: Plant, minv, x, v, g, t, mode, broken):
+    # Force needed to hold the links at rest while the others slide; beyond a limit a link breaks away. One that is
+    # known to have broken goes whichever way it is pulled: at the instant itself rounding decides about the limit.
     rows, rest = plant.friction.direction, mode == 0
     low, high = friction_limits(plant, x, v, t)
     sliding = jnp.where(mode > 0, high, jnp.where(mode < 0, low, 0.0))
     a = free_acceleration(plant, minv, x, v, g, t) - _times(minv, jnp.sum(rows * sliding[:, None], 0))
     held = holding_force(plant, minv, a, rest)
+    low, high = jnp.where(broken, (low + high) / 2, low), jnp.where(broken, (low + high) / 2, high)
     return jnp.where(rest, jnp.where(held > high, 1.0, jnp.where(held < low, -1.0, 0.0)), mode)
 
 
@@ -140,9 +142,9 @@ def advance(plant: Plant, minv, motion: Motion, load: Load) -> Motion:
         switching = ended & (shares == share)
         rows = plant.friction.direction
         vs = vs - _remove(minv, rows, jnp.sum(rows * vs[None, :], 1), switching & (mode != 0))
-        decided = _from_rest(
-            plant, minv, xs, vs, load.at(now), load.time + now * load.step, jnp.where(switching, 0.0, mode)
-        )
+        resting = jnp.where(switching, 0.0, mode)
+        broken = switching & (mode == 0)
+        decided = _from_rest(plant, minv, xs, vs, load.at(now), load.time + now * load.step, resting, broken)
         x, v = jnp.where(any_event, xs, xe), jnp.where(any_event, vs, ve)
         return (x, v, jnp.where(switching, decided, mode), jnp.where(any_event, now, 1.0)), None
 

@@ -32,10 +32,13 @@ class Readings(eqx.Module):
 
 
 class ProcessNoise(eqx.Module):
-    """What disturbs the motion, each (dof,): white noise of the force samples [N²], of the acceleration [(m/s²)² s]."""
+    """Covariance (dof, dof) that every sample adds to that of the velocity.
 
-    force_variance: Float[Array, " dof"]
-    acceleration_density: Float[Array, " dof"]
+    It is the same for all hypotheses: were it to follow a fitted mass or gain, a wrong hypothesis could buy itself
+    noise with it.
+    """
+
+    velocity: Float[Array, "dof dof"]
 
 
 class Start(eqx.Module):
@@ -69,10 +72,7 @@ def innovations(
     minv = inverse_mass(plant)
     dof, dt = plant.dof, fine.step
     variances = readings.variance * jnp.exp(log_scale)
-    # A sensor that reads too much shows too much noise as well.
-    force_variance = noise.force_variance / (1.0 + plant.force_gain) ** 2
-    process = _product(minv * force_variance * dt**2, minv.T) + jnp.diag(noise.acceleration_density * dt)
-    added = jnp.zeros((2 * dof, 2 * dof)).at[dof:, dof:].set(process)
+    added = jnp.zeros((2 * dof, 2 * dof)).at[dof:, dof:].set(noise.velocity)
 
     def body(carry, inputs):
         motion, covariance = carry
@@ -106,7 +106,9 @@ def _transition(plant, minv, before: Motion, after: Motion, time, dt):
     x, v = (before.x + after.x) / 2, (before.v + after.v) / 2
     by_x, by_v = _force_slopes(plant, x, v, time + dt / 2)
     top = jnp.concatenate([jnp.zeros((dof, dof)), jnp.eye(dof)], 1)
-    slope = dt * jnp.concatenate([top, jnp.concatenate([-_product(minv, by_x), -_product(minv, by_v)], 1)], 0)
+    bottom = -_product(minv, jnp.concatenate([by_x, by_v], 1))
+    bottom = _held(plant, minv, bottom, (before.mode == 0) & (after.mode == 0))
+    slope = dt * jnp.concatenate([top, bottom], 0)
     square = _product(slope, slope)
     return jnp.eye(2 * dof) + slope + square / 2 + _product(square, slope) / 6 + _product(square, square) / 24
 
@@ -174,14 +176,18 @@ def _acceleration_and_slope(plant, minv, mean, mode, g, time):
     dof = plant.dof
     a = acceleration(plant, minv, mean[:dof], mean[dof:], mode, g, time)[0]
     by_x, by_v = _force_slopes(plant, mean[:dof], mean[dof:], time)
-    slope = -_product(minv, jnp.concatenate([by_x, by_v], 1))
+    return a, _held(plant, minv, -_product(minv, jnp.concatenate([by_x, by_v], 1)), mode == 0)
+
+
+def _held(plant, minv, slope, sticking):
+    """Derivative of the accelerations by the state once links stick: what would move those is taken up."""
     for i in range(len(plant.friction)):
         row = plant.friction.direction[i]
         effect = jnp.sum(minv * row[None, :], 1)
         scale = jnp.sum(row * effect)
         held = slope - effect[:, None] * jnp.sum(row[:, None] * slope, 0)[None, :] / jnp.where(scale > 0, scale, 1.0)
-        slope = jnp.where((mode[i] == 0) & (scale > 0), held, slope)
-    return a, slope
+        slope = jnp.where(sticking[i] & (scale > 0), held, slope)
+    return slope
 
 
 def _most_probable_mode(plant, minv, select, c, mean, covariance, g, base, time, y, variance, gain):

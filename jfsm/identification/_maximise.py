@@ -11,7 +11,7 @@ from ._posterior import Posterior
 LADDER = (1.0, 0.3, 0.1, 0.03, 0.01)
 """Shares of unmodelled force that the first rungs forgive: the top ones compare forces and have wide basins."""
 _LAST_RUNG = 0.003
-_RUNG_STEPS, _RUNG_ENOUGH = 3, 0.5
+_RUNG_STEPS, _LAST_RUNG_STEPS, _RUNG_ENOUGH = 3, 10, 0.5
 _ENOUGH = 0.01
 """A step that promises less than this many nats is the last,"""
 _HOPELESS = 0.02
@@ -46,7 +46,7 @@ def approach(posterior: Posterior, ladder: Sequence[float] = LADDER, theta: np.n
     theta = posterior.initial() if theta is None else theta
     for share in ladder[:-1]:
         theta = _climb(posterior, theta, share, _RUNG_STEPS, _RUNG_ENOUGH).theta
-    return _climb(posterior, theta, ladder[-1], _RUNG_STEPS, _RUNG_ENOUGH)
+    return _climb(posterior, theta, ladder[-1], _LAST_RUNG_STEPS, _RUNG_ENOUGH)
 
 
 def finish(posterior: Posterior, start: Maximum, steps: int = 25, best: float = np.inf) -> Maximum:

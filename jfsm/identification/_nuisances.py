@@ -37,6 +37,8 @@ class Nuisances:
         Response channels.
     spread : (channels,) array
         Standard deviation of each channel's readings.
+    force_variance : (dof,) array
+        White noise of the force's samples.
     floor : (channels,) array
         Standard deviation of each channel's white noise; a mere guess where `trusted` is false, because the channel's
         signal fills its band.
@@ -54,6 +56,7 @@ class Nuisances:
     fine: Fine
     readings: Readings
     noise: ProcessNoise
+    force_variance: np.ndarray
     spread: np.ndarray
     floor: np.ndarray
     trusted: np.ndarray
@@ -131,7 +134,11 @@ def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "
         valid=jnp.asarray(np.arange(padded) < n, dtype=jnp.float64),
     )
     size = omega**2 * length
-    noise = ProcessNoise(jnp.asarray(force_variance), jnp.full(dof, (_LEAST_DISTURBANCE * size) ** 2 / omega))
+    inverse = np.linalg.inv(np.diag(masses) if masses.ndim == 1 else masses)
+    disturbed = (
+        inverse @ np.diag(force_variance * dt**2) @ inverse.T
+        + np.eye(dof) * (_LEAST_DISTURBANCE * size) ** 2 / omega * dt
+    )
     x0, v0 = starting_state(model, record, reconstruction=reconstruction)
     return Nuisances(
         record=record,
@@ -139,7 +146,8 @@ def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "
         show=readout(channels, dof),
         fine=excitation(record, dof, substeps_for(model, dt), reconstruction, length=padded, force=force),
         readings=readings,
-        noise=noise,
+        noise=ProcessNoise(jnp.asarray(disturbed)),
+        force_variance=force_variance,
         spread=spread,
         floor=np.array(floors),
         trusted=np.array(trusted),

@@ -204,7 +204,8 @@ def slackened(nuisances: Nuisances, share: float) -> ProcessNoise:
     """Process noise that also forgives an unmodelled force of `share` of the elastic force."""
     size = share * nuisances.omega**2 * nuisances.length
     noise = nuisances.noise
-    return ProcessNoise(noise.force_variance, noise.acceleration_density + size**2 / nuisances.omega)
+    forgiven = size**2 / nuisances.omega * nuisances.record.dt
+    return ProcessNoise(noise.velocity + forgiven * jnp.eye(noise.velocity.shape[0]))
 
 
 def prior(unknowns: Sequence[Unknown], theta: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:

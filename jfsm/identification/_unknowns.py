@@ -11,6 +11,8 @@ from ._nuisances import Nuisances
 
 TRUST = {"stiffness": 0.02, "damping": 0.25, "mass": 0.01}
 """How far own values are off as a rule, where the owner does not say: masses are weighed, damping is guessed."""
+_REACH = {"stiffness": math.log(5.0), "mass": math.log(5.0), "damping": math.log(50.0)}
+"""Logarithm of the factor by which an own value may be off; beyond it another structure was measured."""
 DEGREES = 1.5
 """Degrees of freedom of Student's law for own values: right to some per cent as a rule, but far off when wrong."""
 TYPICAL, TYPICAL_SPREAD = 0.15, 1.5
@@ -66,7 +68,8 @@ def own_unknown(structure: Structure, path: str, trust: Mapping[str, float]) -> 
         raise ValueError(
             f"{path} is 0 and cannot be refitted as a share of itself; state a small value, or leave the term out."
         )
-    return Unknown(path, 0.0, value, True, 0.0, math.log1p(width), heavy=True)
+    reach = _REACH.get(kind, _REACH["damping"])
+    return Unknown(path, 0.0, value, True, 0.0, math.log1p(width), heavy=True, low=-reach, high=reach)
 
 
 def free_unknown(structure: Structure, path: str, nuisances: Nuisances) -> Unknown:
@@ -84,7 +87,11 @@ def effect_unknown(structure: Structure, path: str, nuisances: Nuisances) -> Unk
     """The size of a candidate's effect: log-normal about a share of the elastic force, with the sign it has."""
     value = structure.values()[path]
     typical = TYPICAL * natural_size(structure, path, nuisances)
-    return Unknown(path, math.log(abs(value) / typical), math.copysign(typical, value), True, 0.0, TYPICAL_SPREAD)
+    unit = math.copysign(typical, value)
+    unknown = Unknown(path, math.log(value / unit), unit, True, 0.0, TYPICAL_SPREAD)
+    parameter = structure.entries()[path][0]
+    ends = [end / unit for end in (parameter.low, parameter.high)]
+    return replace(unknown, high=math.log(max(ends))) if math.isfinite(max(ends)) else unknown
 
 
 def with_offsets(structure: Structure, records: Sequence[Nuisances]) -> Structure:

@@ -1,7 +1,7 @@
 """The tables of a diagnosis, once, for the terminal and the page."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from jfsm.reporting._quantities import (
@@ -42,6 +42,13 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     text_columns: frozenset[int] = frozenset({0})
     strong: frozenset[int] = frozenset()
+
+    def without_last_column(self) -> "Table":
+        """The same table, one column narrower."""
+        rows = tuple(row[:-1] for row in self.rows)
+        return replace(
+            self, headings=self.headings[:-1], rows=rows, text_columns=self.text_columns - {len(self.headings) - 1}
+        )
 
 
 def findings_table(findings: Sequence[Dictionary]) -> Table:

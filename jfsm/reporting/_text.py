@@ -24,8 +24,12 @@ from jfsm.reporting._tables import (
 )
 from jfsm.reporting._wording import checked_verdict
 
+LONGEST_WORD = 16
+"""Characters of a name's word that are not cut to make room for a number."""
 TONES = {"good": "green", "change": "cyan", "open": "yellow"}
 MOST_CANDIDATES = 8
+ROOM_FOR_REASONS = 100
+"""Characters in a line from which a candidate's reason is shown beside its numbers; the page has it always."""
 
 
 def print_diagnosis(d: Mapping[str, Any], console: Console | None = None) -> None:
@@ -43,7 +47,8 @@ def print_diagnosis(d: Mapping[str, Any], console: Console | None = None) -> Non
     ValueError
         If `d` is not the dictionary of a diagnosis.
     """
-    (console or Console()).print(_diagnosis(d))
+    console = console or Console()
+    console.print(_diagnosis(d, console.width))
 
 
 def print_inspection(d: Mapping[str, Any], console: Console | None = None) -> None:
@@ -53,7 +58,7 @@ def print_inspection(d: Mapping[str, Any], console: Console | None = None) -> No
 
 def diagnosis_text(d: Mapping[str, Any], width: int = 100) -> str:
     """The same as `print_diagnosis` shows, as plain text in lines of `width` characters."""
-    return _plain(_diagnosis(d), width)
+    return _plain(_diagnosis(d, width), width)
 
 
 def inspection_text(d: Mapping[str, Any], width: int = 100) -> str:
@@ -67,7 +72,7 @@ def _plain(renderable: RenderableType, width: int) -> str:
     return "\n".join(line.rstrip() for line in stream.getvalue().splitlines()) + "\n"
 
 
-def _diagnosis(d: Mapping[str, Any]) -> Group:
+def _diagnosis(d: Mapping[str, Any], width: int) -> Group:
     verdict = checked_verdict(d)
     colour = TONES[verdict.tone]
     headline = Text.assemble((d.get("sentence") or verdict.meaning, "bold"))
@@ -77,18 +82,19 @@ def _diagnosis(d: Mapping[str, Any]) -> Group:
     return Group(
         Panel(headline, title=title, title_align="left", border_style=colour, padding=(1, 2)),
         _answers(d),
-        *(_rich_table(table) for table in _tables(d) if table.rows),
+        *(_rich_table(table) for table in _tables(d, width) if table.rows),
         *_bullets("Notes", d.get("notes") or ()),
     )
 
 
-def _tables(d: Mapping[str, Any]) -> Iterator[Table]:
+def _tables(d: Mapping[str, Any], width: int) -> Iterator[Table]:
     findings = d.get("findings") or ()
     yield findings_table(findings)
     yield rivals_table(findings)
     yield gain_table((d.get("gain") or {}).get("channels") or {})
     yield refitted_table(d.get("refitted") or {})
-    yield candidates_table((d.get("candidates") or ())[:MOST_CANDIDATES], findings)
+    candidates = candidates_table((d.get("candidates") or ())[:MOST_CANDIDATES], findings)
+    yield candidates if width >= ROOM_FOR_REASONS else candidates.without_last_column()
 
 
 def _answers(d: Mapping[str, Any]) -> RenderableType:
@@ -121,7 +127,12 @@ def _rich_table(table: Table) -> RenderableType:
     # Cells are Text: brackets in a name are not markup.
     shown = RichTable(title=Text(table.title, style="bold"), title_justify="left", box=SIMPLE_HEAD)
     for column, heading in enumerate(table.headings):
-        shown.add_column(Text(heading), justify="left" if column in table.text_columns else "right")
+        words = " ".join(row[column] for row in table.rows).split() if column in table.text_columns else []
+        shown.add_column(
+            Text(heading),
+            justify="left" if column in table.text_columns else "right",
+            min_width=min(max(map(len, words), default=0), LONGEST_WORD),
+        )
     for row, cells in enumerate(table.rows):
         shown.add_row(*map(Text, cells), style="bold" if row in table.strong else None)
     return shown

@@ -55,7 +55,9 @@ class ForceGain(AbstractSensor):
     at: tuple[str, int] = eqx.field(converter=as_channel, static=True, kw_only=True)
     kind = "force_gain"
     channel = "force"
-    parameters = (Parameter("eps", positive=False, meaning="relative gain error of the force sensor"),)
+    parameters = (
+        Parameter("eps", positive=False, meaning="relative gain error of the force sensor", low=-0.8, high=2.0),
+    )
 
 
 class AccelerationGain(AbstractSensor):
@@ -65,7 +67,9 @@ class AccelerationGain(AbstractSensor):
     at: tuple[str, int] = eqx.field(converter=as_channel, static=True, kw_only=True)
     kind = "accel_gain"
     channel = "acceleration"
-    parameters = (Parameter("eps", positive=False, meaning="relative gain error of the accelerometer"),)
+    parameters = (
+        Parameter("eps", positive=False, meaning="relative gain error of the accelerometer", low=-0.8, high=2.0),
+    )
 
 
 class Offset(AbstractSensor):

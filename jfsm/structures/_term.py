@@ -1,6 +1,7 @@
 """The term contract: everything on the left-hand side of the equation of motion is a term."""
 
 import abc
+import math
 import operator
 from typing import Any, ClassVar, NamedTuple
 
@@ -14,7 +15,8 @@ Scalar = Float[Array, ""]
 class Parameter(NamedTuple):
     """One number of a law.
 
-    `force`, `length` and `time` are the exponents of its unit: N/m³ is ``force=1, length=-3``.
+    `force`, `length` and `time` are the exponents of its unit: N/m³ is ``force=1, length=-3``. A fit keeps it between
+    `low` and `high`.
     """
 
     name: str
@@ -23,6 +25,8 @@ class Parameter(NamedTuple):
     time: int = 0
     positive: bool = True
     meaning: str = ""
+    low: float = -math.inf
+    high: float = math.inf
 
     def unit(self, force: str = "N", length: str = "m", time: str = "s") -> str:
         """The unit in words, ``"N/m^3"``, from the record's unit of force and of length."""

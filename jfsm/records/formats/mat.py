@@ -24,6 +24,13 @@ class MatFormat(AbstractFormat):
                 f"{path.name} must be a MATLAB file of version 7 or earlier; it is of version 7.3, which is HDF5. "
                 f'Save it in MATLAB with save(..., "-v7").'
             ) from error
+        except OSError:
+            raise
+        except Exception as error:  # whatever the reader stumbles over in bytes that are no such file
+            raise ValueError(
+                f"{path.name} must be a MATLAB file; it cannot be opened as one ({error}), and may be cut short. "
+                f"Write or copy it again."
+            ) from error
         remarks = json.loads(str(variables.pop(ABOUT))) if ABOUT in variables else {}
         arrays: dict[str, np.ndarray] = {}
         units: dict[str, str] = {}

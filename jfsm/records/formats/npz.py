@@ -1,8 +1,10 @@
 """NumPy archives."""
 
 import json
+import zipfile
+import zlib
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -15,20 +17,32 @@ class NpzFormat(AbstractFormat):
     suffixes: ClassVar[tuple[str, ...]] = (".npz",)
 
     def load(self, path: Path) -> Contents:
-        arrays, remarks = {}, {}
-        with np.load(path, allow_pickle=False) as archive:
-            for name in archive.files:
-                try:
-                    array = archive[name]
-                except ValueError:  # an object array: running a stranger's pickle is not reading data
-                    continue
-                if name == ABOUT:
-                    remarks = json.loads(str(array))
-                else:
-                    arrays[name] = array
+        try:
+            arrays, remarks = _arrays(path)
+        except (ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:  # numpy's words are about pickles
+            raise ValueError(
+                f"{path.name} must be an archive of numpy.savez; it cannot be opened as one, and may be cut short. "
+                f"Write or copy it again."
+            ) from error
         return Contents(arrays, remarks.pop("units", {}), remarks)
 
     def save(self, path: Path, contents: Contents) -> None:
         remarks = json.dumps({"units": dict(contents.units), **contents.about})
         with path.open("wb") as stream:
             np.savez(stream, allow_pickle=False, **contents.arrays, **{ABOUT: np.array(remarks)})
+
+
+def _arrays(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Arrays of an archive by name, and what `save` noted beside them."""
+    arrays, remarks = {}, {}
+    with np.load(path, allow_pickle=False) as archive:
+        for name in archive.files:
+            try:
+                array = archive[name]
+            except ValueError:  # an object array: running a stranger's pickle is not reading data
+                continue
+            if name == ABOUT:
+                remarks = json.loads(str(array))
+            else:
+                arrays[name] = array
+    return arrays, remarks

@@ -1,0 +1,160 @@
+"""The filter of a plant: for a linear one it must say what a dense multivariate normal law says."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.stats import multivariate_normal
+
+import jfsm
+from jfsm.dynamics._excitation import excitation
+from jfsm.dynamics._plant import lower, readout
+from jfsm.estimation import Innovations, ProcessNoise, Readings, Start, innovations
+from jfsm.structures import AccelerationGain, ForceGain, Offset
+
+N, DT, PADDED = 60, 0.02, 64
+TIME = DT * np.arange(N)
+MODEL = (
+    jfsm.Structure.chain(mass=[1.0, 0.6], stiffness=[9.0, 5.0], damping=[0.2, 0.1])
+    + ForceGain(0.1, at=("force", 2))
+    + Offset(0.3, at=("displacement", 1))
+    + AccelerationGain(-0.2, at=("acceleration", 2))
+)
+CHANNELS = (("displacement", 1), ("velocity", 2), ("acceleration", 2))
+VARIANCE = np.array([1e-4, 4e-4, 9e-3])
+LOG_SCALE = np.array([0.3, 0.0, -0.5])
+PROCESS = np.array([[2e-5, 1e-5], [1e-5, 7e-5]])
+X0, V0 = np.array([0.2, -0.1]), np.array([0.0, 0.4])
+START_COVARIANCE = np.diag([0.02, 0.03, 0.05, 0.01])
+
+
+def measured() -> tuple[np.ndarray, np.ndarray]:
+    """Force (n, 2) and readings (n, channels): any will do, they need not be likely."""
+    rng = np.random.default_rng(5)
+    force = np.column_stack([np.sin(3 * TIME), 2 * np.cos(5 * TIME)])
+    return force, 0.1 * rng.standard_normal((N, len(CHANNELS))) + np.array([0.5, 0.2, 1.0])
+
+
+def filtered(model=MODEL, values=None, use=None, length: int = PADDED) -> Innovations:
+    force, readings = measured()
+    readings = readings if values is None else values
+    use = np.ones_like(readings) if use is None else use
+    record = jfsm.Record(TIME, force)
+    fill = ((0, length - N), (0, 0))
+    return RUN(
+        lower(model, CHANNELS),
+        readout(CHANNELS, 2),
+        excitation(record, 2, 4, "linear", length=length),
+        Readings(
+            jnp.asarray(np.pad(readings, fill, constant_values=7.0)),
+            jnp.asarray(np.pad(use, fill)),
+            jnp.asarray(VARIANCE),
+            jnp.asarray(np.arange(length) < N, dtype=jnp.float64),
+        ),
+        ProcessNoise(jnp.asarray(PROCESS)),
+        Start(jnp.asarray(X0), jnp.asarray(V0), jnp.asarray(START_COVARIANCE)),
+        jnp.asarray(LOG_SCALE),
+    )
+
+
+def log_likelihood(found: Innovations, use: np.ndarray) -> float:
+    e, s = np.asarray(found.error)[:N], np.asarray(found.variance)[:N]
+    return float(-0.5 * np.sum(use * (e**2 / s + np.log(2 * np.pi * s))))
+
+
+def dense_law() -> tuple[np.ndarray, np.ndarray]:
+    """Mean and covariance of all readings at once, (n * channels,), by matrix exponentials and plain propagation."""
+    mass = np.diag([1.0, 0.6])
+    stiffness = np.array([[14.0, -5.0], [-5.0, 5.0]])
+    damping = np.array([[0.3, -0.1], [-0.1, 0.1]])
+    inverse = np.linalg.inv(mass)
+    rate = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ stiffness, -inverse @ damping]])
+    by_force = np.vstack([np.zeros((2, 2)), inverse])
+    chain = np.zeros((8, 8))  # state, force, slope of the force
+    chain[:4, :4], chain[:4, 4:6], chain[4:6, 6:] = rate, by_force, np.eye(2)
+    step = expm(chain * DT)
+    force = measured()[0] / (1 + np.array([0.0, 0.1]))
+    noise = np.zeros((4, 4))
+    noise[2:, 2:] = PROCESS
+    rows = np.array([[1, 0, 0, 0], [0, 0, 0, 1], 0.8 * rate[3]])
+    through = np.array([np.zeros(2), np.zeros(2), 0.8 * inverse[1]])
+    means, covariance = [np.concatenate([X0, V0])], np.zeros((N, 4, N, 4))
+    covariance[0, :, 0] = START_COVARIANCE
+    for k in range(N - 1):
+        slope = (force[k + 1] - force[k]) / DT
+        means.append(step[:4, :4] @ means[k] + step[:4, 4:6] @ force[k] + step[:4, 6:] @ slope)
+        for j in range(k + 1):
+            covariance[k + 1, :, j] = step[:4, :4] @ covariance[k, :, j]
+            covariance[j, :, k + 1] = covariance[k + 1, :, j].T
+        covariance[k + 1, :, k + 1] = step[:4, :4] @ covariance[k, :, k] @ step[:4, :4].T + noise
+    mean = np.array(means) @ rows.T + force @ through.T + np.array([0.3, 0.0, 0.0])
+    spread = np.einsum("ci,kilj,dj->kcld", rows, covariance, rows).reshape(N * 3, N * 3)
+    return mean.ravel(), spread + np.diag(np.tile(VARIANCE * np.exp(LOG_SCALE), N))
+
+
+RUN = eqx.filter_jit(innovations)
+ALL = np.ones((N, len(CHANNELS)))
+
+
+def random_mask() -> np.ndarray:
+    return (np.random.default_rng(6).uniform(size=ALL.shape) < 0.7).astype(float)
+
+
+@pytest.mark.parametrize("use", [ALL, random_mask()], ids=["all", "some masked"])
+def test_the_innovations_of_a_linear_plant_have_the_likelihood_of_a_dense_normal_law(use):
+    mean, covariance = dense_law()
+    kept = use.ravel() > 0
+    expected = multivariate_normal.logpdf(
+        measured()[1].ravel()[kept], mean[kept], covariance[np.ix_(kept, kept)], allow_singular=False
+    )
+    assert log_likelihood(filtered(use=use), use) == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_value_of_a_masked_reading_changes_nothing_else():
+    use, values = random_mask(), measured()[1]
+    torn = np.where(use > 0, values, 1e6)
+    found, expected = filtered(values=torn, use=use), filtered(values=values, use=use)
+    np.testing.assert_array_equal(found.variance, expected.variance)
+    np.testing.assert_array_equal(np.asarray(found.error)[:N][use > 0], np.asarray(expected.error)[:N][use > 0])
+
+
+def test_a_masked_stretch_is_predicted_with_an_error_bar_that_grows():
+    use = ALL.copy()
+    use[20:] = 0.0
+    variance = np.asarray(filtered(use=use).variance)[20:N, 0]
+    assert np.all(np.diff(variance) > 0)
+
+
+def test_padding_changes_no_innovation():
+    short, long = filtered(length=N), filtered(length=PADDED + 16)
+    # The same operations, but a compiler may order a sum in another way for another length.
+    np.testing.assert_allclose(long.error[:N], short.error, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(long.variance[:N], short.variance, rtol=1e-12)
+
+
+def test_an_empty_slot_for_a_law_or_for_friction_changes_nothing():
+    plain = filtered()
+    for term in (jfsm.CubicStiffness(0.0, at=(1, 2)), jfsm.Coulomb(0.0, at=(0, 1))):
+        found = filtered(MODEL + term)
+        np.testing.assert_allclose(found.error[:N], plain.error[:N], rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(found.variance[:N], plain.variance[:N], rtol=1e-6)
+
+
+def test_while_a_link_sticks_nothing_is_uncertain_about_its_speed():
+    model = jfsm.Structure.sdof(1.0, 9.0, 0.2) + jfsm.Coulomb(50.0, at=(0, 1))
+    channels = (("displacement", 1), ("velocity", 1))
+    values, n = np.zeros((32, 2)), 32
+    found = RUN(
+        lower(model, channels),
+        readout(channels, 1),
+        excitation(jfsm.Record(DT * np.arange(n), np.sin(np.arange(n))), 1, 2, "linear"),
+        Readings(jnp.asarray(values), jnp.ones((n, 2)), jnp.asarray([1e-4, 1e-4]), jnp.ones(n)),
+        ProcessNoise(jnp.asarray([[0.1]])),
+        Start(jnp.zeros(1), jnp.zeros(1), jnp.diag(jnp.asarray([0.01, 0.0]))),
+        jnp.zeros(2),
+    )
+    np.testing.assert_allclose(found.variance[:, 1], 1e-4, rtol=1e-9)
+    # The place at rest is known ever better, as a mean of readings is.
+    expected = 1e-4 + 1 / (1 / 0.01 + np.arange(n) / 1e-4)
+    np.testing.assert_allclose(found.variance[:, 0], expected, rtol=1e-9)
