@@ -327,7 +327,8 @@ def _is_refusal(error: Exception) -> bool:
     A ValueError from a library underneath is a mistake of jfsm, whose traceback is wanted.
     """
     *_, (frame, _) = traceback.walk_tb(error.__traceback__)
-    return isinstance(error, OSError) or frame.f_globals["__spec__"].name.split(".")[0] == "jfsm"
+    package = frame.f_globals.get("__package__") or ""
+    return isinstance(error, OSError) or package.split(".")[0] == "jfsm"
 
 
 def _words(error: Exception) -> str:

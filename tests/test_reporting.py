@@ -304,11 +304,12 @@ def test_text_of_a_cause_says_where_how_sure_how_large_and_what_else_it_may_be()
         assert words in text
 
 
-def test_a_narrow_terminal_shows_whole_names_and_leaves_reasons_to_the_page():
+def test_a_narrow_terminal_shows_whole_words_and_leaves_errors_and_reasons_to_the_page():
     narrow, wide = (diagnosis_text(diagnosis("cause"), width=width) for width in (80, 120))
     assert "explains too" in wide and "explains too" not in narrow
     rows = narrow[narrow.index("Candidates") :]
-    assert all(word in rows for word in ("hardening", "friction", "hysteresis", "link", "ground–1"))
+    assert all(word in rows for word in ("hardening", "Coulomb friction", "link ground–1", "probability", "96 %"))
+    assert "fitted" in wide[wide.index("Candidates") :] and "fitted" not in rows
     assert max(map(len, narrow.splitlines())) <= 80
 
 

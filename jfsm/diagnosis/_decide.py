@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..structures import AbstractTerm
 from ._trial import Trial
 
 GATE = 0.5
@@ -35,6 +36,13 @@ class Decision:
     probability: dict[int, float]
     kappa: dict[int, float]
     why: dict[int, str]
+
+    @property
+    def named_term(self) -> AbstractTerm | None:
+        """The winner's term, if a law was named."""
+        cause = self.winner.cause
+        named = self.verdict == "cause" and cause is not None and not cause.is_sensor
+        return self.winner.structure.terms[-1] if named else None
 
     def share(self, trial: Trial) -> float:
         """Probability of a trial; 0 for one that is no alternative."""
@@ -92,7 +100,7 @@ def decide(
     winner = alternatives[int(np.argmax(share))]
     for t in passing:
         if t is not winner:
-            why[id(t)] = f"explains it too, but is {winner.evidence - t.evidence:.1f} nats less probable than the best"
+            why[id(t)] = "explains it too, but is less probable"
     mapped = None if adequate(winner) else stand_in()
     verdict = _verdict(given, refitted, winner, tried, mapped)
     if verdict == "cause" and chance[id(winner)] < 0.5:
@@ -123,10 +131,10 @@ def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
     same = t.cause is not None and t.cause.is_sensor and adequate(t) and adequate(refitted)
     better = t.evidence - (given.evidence if same else max(given.evidence, refitted.evidence))
     if better <= SIGNIFICANT:
-        return f"is not more probable than the model {'as given' if same else 'refitted'} ({better:+.1f} nats)"
+        return f"no more probable than the model {'as given' if same else 'refitted'}"
     if over_refit >= GATE or (adequate(t) and over_given >= GATE):
         return ""
-    return f"explains {max(over_refit, 0.0):.0%} of what a refit leaves; half is the least for a cause"
+    return f"explains {max(over_refit, 0.0):.0%} of what a refit leaves, less than half"
 
 
 def _verdict(given: Trial, refitted: Trial, winner: Trial, tried: Sequence[Trial], mapped: Trial | None) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..identification import Nuisances
-from ..structures import PARAMETER_CAUSES, AbstractTerm, Structure
+from ..structures import PARAMETER_CAUSES, Structure
 from ._decide import Decision
 from ._detectable import detectable
 from ._diagnosis import CandidateResult, Diagnosis, Estimate, Finding, Rival
@@ -60,19 +60,13 @@ def assemble(
         "gain": None if gain is None else _gain(gain),
         "notes": list(notes),
         "detectable": {c: {"parameter": p, "value": e.value, "unit": e.unit} for c, (p, e) in smallest.items()},
-        "curves": {"holdout": _holdout(runs), **curves(missing, units, _law(decision, extended))},
+        "curves": {"holdout": _holdout(runs), **curves(missing, units, decision.named_term)},
     }
     return Diagnosis(
         verdict=decision.verdict, findings=findings, candidates=candidates, extended=extended, refitted=refit,
         gain=gain, detectable={c: e for c, (_, e) in smallest.items()}, noise=noise, notes=notes,
         sentence=sentence, advice=advice, data=data,
     )  # fmt: skip
-
-
-def _law(decision: Decision, extended: Structure) -> AbstractTerm | None:
-    """The named term, if a term was named."""
-    cause = decision.winner.cause
-    return None if decision.verdict != "cause" or cause is None or cause.is_sensor else extended.terms[-1]
 
 
 def _version() -> str:
@@ -179,10 +173,8 @@ def _words(decision: Decision, findings: tuple[Finding, ...], gain: Gain | None)
     if decision.verdict == "cause" and decision.winner.cause is not None:
         f = findings[0]
         where = "-".join(str(a) for a in f.at)
-        return (
-            f"The model lacks {decision.winner.cause.label} at {where}: {f.sentence}.{share}",
-            "Use the extended model.",
-        )  # pyright: ignore
+        lacks = "The record shows" if decision.winner.cause.is_sensor else "The model lacks"
+        return f"{lacks} {decision.winner.cause.label} at {where}: {f.sentence}.{share}", "Use the extended model."
     if decision.verdict == "unnamed":
         return (
             f"A real effect is there that no catalogue entry explains; a map stands in.{share}",

@@ -32,9 +32,12 @@ class Residual:
     force_map: RKPM | None
 
 
-def residual(trial: Trial, model: Structure, nuisances: Nuisances, until: int) -> Residual:
-    """Missing force on the link that carries most of it, and its map over the first `until` samples."""
-    plant = lower(trial.structure, nuisances.channels)
+def residual(structure: Structure, nuisances: Nuisances, until: int, at: tuple[int, int] | None = None) -> Residual:
+    """Force that `structure` lacks on the link `at`, and its map over the first `until` samples.
+
+    Without `at` it is the link that carries most of it.
+    """
+    plant = lower(structure, nuisances.channels)
     n = nuisances.samples
     readings, fine = nuisances.readings, nuisances.fine
     found = latent_force(
@@ -42,10 +45,11 @@ def residual(trial: Trial, model: Structure, nuisances: Nuisances, until: int) -
         np.asarray(readings.values)[:n], np.asarray(readings.use)[:n],
         readings.variance, nuisances.force_variance, nuisances.omega, nuisances.length,
     )  # fmt: skip
-    rows = np.array([direction(at, model.dof) for at in model.links])
+    links = list(structure.links)
+    rows = np.array([direction(link, structure.dof) for link in links])
     # Forces on degrees of freedom as forces on links: exact for a chain, least squares otherwise.
     forces = np.linalg.lstsq(rows.T, found.force.T, rcond=None)[0]
-    link = int(np.argmax(np.std(forces, axis=1)))
+    link = int(np.argmax(np.std(forces, axis=1))) if at is None else links.index(at)
     d, w, f = found.displacement @ rows[link], found.velocity @ rows[link], forces[link]
     count = min(until, n)
     take = np.unique(np.linspace(0, count - 1, min(count, _NODES)).astype(int))
@@ -55,7 +59,7 @@ def residual(trial: Trial, model: Structure, nuisances: Nuisances, until: int) -
         )
     except (ValueError, RuntimeError):  # one orbit only, or too few points: there is no surface to draw
         force_map = None
-    return Residual(model.links[link], d, w, f, force_map)
+    return Residual(links[link], d, w, f, force_map)
 
 
 def stand_in(found: Residual, refitted: Trial, records: list[Nuisances], until: list[int]) -> Trial | None:

@@ -43,11 +43,14 @@ class Table:
     text_columns: frozenset[int] = frozenset({0})
     strong: frozenset[int] = frozenset()
 
-    def without_last_column(self) -> "Table":
-        """The same table, one column narrower."""
-        rows = tuple(row[:-1] for row in self.rows)
+    def only(self, *headings: str) -> "Table":
+        """The same table with these columns alone."""
+        kept = [column for column, heading in enumerate(self.headings) if heading in headings]
         return replace(
-            self, headings=self.headings[:-1], rows=rows, text_columns=self.text_columns - {len(self.headings) - 1}
+            self,
+            headings=tuple(self.headings[column] for column in kept),
+            rows=tuple(tuple(row[column] for column in kept) for row in self.rows),
+            text_columns=frozenset(place for place, column in enumerate(kept) if column in self.text_columns),
         )
 
 

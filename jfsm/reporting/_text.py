@@ -28,8 +28,9 @@ LONGEST_WORD = 16
 """Characters of a name's word that are not cut to make room for a number."""
 TONES = {"good": "green", "change": "cyan", "open": "yellow"}
 MOST_CANDIDATES = 8
-ROOM_FOR_REASONS = 100
-"""Characters in a line from which a candidate's reason is shown beside its numbers; the page has it always."""
+WIDE = 100
+"""Characters in a line from which a candidate's errors and the reason against it are shown; the page has them always."""
+ESSENTIAL = ("cause", "place", "evidence [nats]", "explains", "probability")
 
 
 def print_diagnosis(d: Mapping[str, Any], console: Console | None = None) -> None:
@@ -94,7 +95,7 @@ def _tables(d: Mapping[str, Any], width: int) -> Iterator[Table]:
     yield gain_table((d.get("gain") or {}).get("channels") or {})
     yield refitted_table(d.get("refitted") or {})
     candidates = candidates_table((d.get("candidates") or ())[:MOST_CANDIDATES], findings)
-    yield candidates if width >= ROOM_FOR_REASONS else candidates.without_last_column()
+    yield candidates if width >= WIDE else candidates.only(*ESSENTIAL)
 
 
 def _answers(d: Mapping[str, Any]) -> RenderableType:

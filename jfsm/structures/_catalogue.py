@@ -71,11 +71,11 @@ _CAUSES = (
         "a drag that grows with the square of the velocity",
     ),
     Cause(
-        "force_gain", "sensor", "the gain error of the force sensor", ForceGain, 0,
+        "force_gain", "sensor", "a gain error of the force sensor", ForceGain, 0,
         "it reads too much or too little by a fixed share",
     ),
     Cause(
-        "accel_gain", "sensor", "the gain error of the accelerometer", AccelerationGain, 0,
+        "accel_gain", "sensor", "a gain error of the accelerometer", AccelerationGain, 0,
         "it reads too much or too little by a fixed share",
     ),
 )  # fmt: skip

@@ -108,6 +108,13 @@ class Structure(eqx.Module):
             return Structure(self.mass, self.terms, (*self.sensors, other), self.trust)
         return NotImplemented
 
+    def without(self, term: AbstractTerm) -> "Structure":
+        """The structure less one of its terms."""
+        kept = [t for t in self.terms if t is not term]
+        if len(kept) == len(self.terms):
+            raise ValueError(f"`term` must be one of the structure's own terms; got {term!r}.")
+        return Structure(self.mass, kept, self.sensors, self.trust)
+
     def uncertain(self, **relative: float) -> "Structure":
         """The same structure with stated trust: ``uncertain(stiffness=0.05)`` says stiffnesses are right to 5 %."""
         for name, value in relative.items():
@@ -168,8 +175,7 @@ class Structure(eqx.Module):
         force, length = (units or {}).get("force", "N"), (units or {}).get("displacement", "m")
         lines = []
         for path, (parameter, value) in self.entries().items():
-            unit = "kg" if path.startswith("mass@") and (force, length) == ("N", "m") else parameter.unit(force, length)
-            lines.append(f"{path} = {float(value):.6g} {unit}")
+            lines.append(f"{path} = {float(value):.6g} {parameter.unit(force, length)}")
         return lines + [f"{term.kind}@{term.place}" for term in self.terms if not term.parameters]
 
     def save(self, path: str | Path) -> None:

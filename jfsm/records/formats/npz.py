@@ -35,7 +35,7 @@ class NpzFormat(AbstractFormat):
 def _arrays(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Arrays of an archive by name, and what `save` noted beside them."""
     arrays, remarks = {}, {}
-    with np.load(path, allow_pickle=False) as archive:
+    with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
         for name in archive.files:
             try:
                 array = archive[name]

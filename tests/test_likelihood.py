@@ -1,0 +1,187 @@
+"""The likelihood: its derivatives against finite differences, its lanes against each other, its programs counted."""
+
+from dataclasses import replace
+
+import equinox as eqx
+import numpy as np
+import pytest
+
+import jfsm
+from jfsm.identification import (
+    Hypothesis,
+    Nuisances,
+    Posterior,
+    _likelihood,
+    effect_unknown,
+    nuisance_unknowns,
+    own_unknown,
+    prepare,
+    with_offsets,
+)
+from jfsm.identification._posterior import prior
+from jfsm.structures import AbstractTerm
+
+N, DT = 200, 0.05
+TIME = DT * np.arange(N)
+MODEL = jfsm.Structure.chain(mass=[1.3, 0.8], stiffness=[9.0, 12.0], damping=[0.3, 0.2])
+SINGLE = jfsm.Structure.sdof(mass=1.3, stiffness=9.0, damping=0.3)
+
+
+def noisy_record(model: jfsm.Structure, n: int = N, seed: int = 0) -> jfsm.Record:
+    """A run of `model` read with 1 % noise; a force at every degree of freedom."""
+    rng, time = np.random.default_rng(seed), DT * np.arange(n)
+    force = np.column_stack([5 * np.sin(1.3 * time + j) + 3 * np.sin((2.9 + j) * time) for j in range(model.dof)])
+    run = jfsm.simulate(model, jfsm.Record(time, force, at_rest=True), solver="grid")
+    channels = {kind: getattr(run, kind) for kind in ("displacement", "acceleration")}
+    noisy = {kind: y + 0.01 * np.std(y, 0) * rng.standard_normal(y.shape) for kind, y in channels.items()}
+    return jfsm.Record(time, force, **noisy)
+
+
+@pytest.fixture(scope="module")
+def chain_nuisances() -> Nuisances:
+    return prepare(noisy_record(MODEL + jfsm.CubicStiffness(2.0, at=(1, 2))), MODEL)
+
+
+@pytest.fixture(scope="module")
+def single_nuisances() -> Nuisances:
+    return prepare(noisy_record(SINGLE + jfsm.Coulomb(1.0, at=(0, 1))), SINGLE)
+
+
+def hypothesis(model: jfsm.Structure, term: AbstractTerm | None, nuisances: Nuisances) -> Hypothesis:
+    """`model` with one more term, all its numbers and the nuisances unknown."""
+    own = list(model.values())
+    structure = with_offsets(model if term is None else model + term, [nuisances])
+    unknowns = [own_unknown(structure, path, {}) for path in own]
+    if term is not None:
+        unknowns.append(effect_unknown(structure, f"{term.kind}@{term.place}.{term.parameters[0].name}", nuisances))
+    return Hypothesis((structure,), ((*unknowns, *nuisance_unknowns(structure, nuisances, 0)),))
+
+
+def together(*single: Hypothesis) -> Hypothesis:
+    return Hypothesis(tuple(h.structures[0] for h in single), tuple(h.unknowns[0] for h in single))
+
+
+CUBIC = jfsm.CubicStiffness(1.5, at=(1, 2))
+FRICTION = jfsm.Coulomb(0.8, at=(0, 1))
+
+
+@pytest.fixture(scope="module")
+def smooth(chain_nuisances) -> Posterior:
+    return Posterior(hypothesis(MODEL, CUBIC, chain_nuisances), [chain_nuisances])
+
+
+@pytest.fixture(scope="module")
+def friction(single_nuisances) -> Posterior:
+    return Posterior(hypothesis(SINGLE, FRICTION, single_nuisances), [single_nuisances])
+
+
+def somewhere(posterior: Posterior) -> np.ndarray:
+    """Values off the start, so that nothing is zero by chance."""
+    start = posterior.initial()
+    return start + 0.02 * np.random.default_rng(3).standard_normal(start.shape)
+
+
+@pytest.mark.parametrize("kind", ["smooth", "friction"])
+def test_the_gradient_is_that_of_the_value(kind, request):
+    posterior: Posterior = request.getfixturevalue(kind)
+    theta = somewhere(posterior)
+    gradient = posterior.evaluate(theta)[1][0]
+    step = 1e-6
+    for k in range(theta.shape[1]):
+        up, down = theta.copy(), theta.copy()
+        up[0, k] += step
+        down[0, k] -= step
+        difference = (posterior.evaluate(up)[0][0] - posterior.evaluate(down)[0][0]) / (2 * step)
+        # Values of some thousand nats hold a difference to 1e-12 of themselves, divided by the step.
+        assert difference == pytest.approx(gradient[k], rel=1e-4, abs=1e-5 * np.max(np.abs(gradient)) + 1e-2)
+
+
+@pytest.mark.parametrize("kind", ["smooth", "friction"])
+def test_the_information_is_made_of_the_slopes_of_the_innovations(kind, request):
+    posterior: Posterior = request.getfixturevalue(kind)
+    theta, step = somewhere(posterior)[0], 1e-6
+    use = np.asarray(posterior.records[0].readings.use)[:N]
+    variance = np.asarray(posterior.innovations(theta).variance)
+    by_error, by_variance = [], []
+    for k in range(theta.size):
+        found = [posterior.innovations(theta + sign * step * np.eye(theta.size)[k]) for sign in (1, -1)]
+        by_error.append((np.asarray(found[0].error) - found[1].error) / (2 * step) * np.sqrt(use / variance))
+        ratio = np.log(np.asarray(found[0].variance) / found[1].variance)
+        by_variance.append(ratio / (2 * step) * np.sqrt(use / 2))
+    slopes = np.array([*np.reshape(by_error, (theta.size, -1)).T, *np.reshape(by_variance, (theta.size, -1)).T])
+    known = np.array([1 / u.width**2 for u in posterior.hypothesis.unknowns[0]])
+    found = posterior.evaluate(theta[None])[2][0]
+    likelihood = slopes.T @ slopes
+    weak = np.array([u.heavy for u in posterior.hypothesis.unknowns[0]])  # their prior's curvature depends on theta
+    scale = np.sqrt(np.outer(np.diag(likelihood), np.diag(likelihood))) + np.diag(known) + 1e-9
+    off = (found - likelihood - np.diag(np.where(weak, np.diag(found - likelihood), known))) / scale
+    np.testing.assert_allclose(off, 0.0, atol=1e-4)
+    assert np.all(np.diag(found) >= np.diag(likelihood) * (1 - 1e-4)), "a prior law adds information"
+
+
+def test_two_lanes_are_what_each_of_them_is_alone(chain_nuisances, smooth):
+    other = hypothesis(MODEL, jfsm.CubicStiffness(-0.7, at=(0, 1)), chain_nuisances)
+    both = Posterior(together(smooth.hypothesis, other), [chain_nuisances])
+    theta = somewhere(both)
+    found = both.evaluate(theta)
+    for lane, alone in enumerate((smooth, Posterior(other, [chain_nuisances]))):
+        for part, expected in zip(found, alone.evaluate(theta[lane][None]), strict=True):
+            np.testing.assert_allclose(part[lane], expected[0], rtol=1e-9, atol=1e-9 * np.max(np.abs(expected)))
+
+
+def test_more_starts_than_lanes_are_refused(chain_nuisances, smooth):
+    with pytest.raises(ValueError, match=r"At most 2 starts fit into one call; got 3\."):
+        Posterior(together(*[smooth.hypothesis] * 3), [chain_nuisances])
+
+
+def test_the_likelihoods_of_two_records_add_up(chain_nuisances, smooth):
+    one = smooth.hypothesis
+    shared = tuple(u for u in one.unknowns[0] if u.record is None)
+    own = tuple(u for u in one.unknowns[0] if u.record is not None)
+    second = tuple(replace(u, record=1) for u in own)
+    both = Posterior(Hypothesis(one.structures, ((*shared, *own, *second),)), [chain_nuisances, chain_nuisances])
+    theta = somewhere(smooth)
+    twice = np.concatenate([theta, theta[:, len(shared) :]], axis=1)
+    alone = smooth.evaluate(theta)[0][0]
+    counted_twice = prior(shared, theta[0, : len(shared)])[0]
+    assert both.evaluate(twice)[0][0] == pytest.approx(2 * alone - counted_twice, rel=1e-12)
+
+
+def test_samples_after_the_end_that_counts_have_no_part(chain_nuisances, smooth):
+    until = 150
+    torn = chain_nuisances.readings.values.at[until:].add(0.5)
+    spoiled = replace(chain_nuisances, readings=eqx.tree_at(lambda r: r.values, chain_nuisances.readings, torn))
+    values = [
+        Posterior(smooth.hypothesis, [nuisances], ends).evaluate(somewhere(smooth))[0][0]
+        for nuisances, ends in ((chain_nuisances, [until]), (spoiled, [until]), (spoiled, None))
+    ]
+    assert values[0] == values[1]
+    assert values[2] > values[0] + 100
+
+
+@pytest.fixture
+def traces(monkeypatch) -> list[None]:
+    """One entry for each time that the likelihood is traced into a program."""
+    found, run = [], _likelihood._run
+    monkeypatch.setattr(_likelihood, "_run", lambda *args: found.append(None) or run(*args))
+    return found
+
+
+def test_one_program_serves_every_smooth_law_at_every_place_with_either_sign(traces):
+    # A length that no other test has, so that the program cannot be there already.
+    nuisances = prepare(noisy_record(MODEL, n=130), MODEL)
+    laws = (jfsm.CubicStiffness, jfsm.QuadraticStiffness, jfsm.QuadraticDamping)
+    terms = [None, *(law(size, at=at) for law in laws for size in (0.3, -0.3) for at in ((0, 1), (1, 2), (0, 2)))]
+    for term in terms:
+        posterior = Posterior(hypothesis(MODEL, term, nuisances), [nuisances])
+        value, gradient, _ = posterior.evaluate(posterior.initial())
+        assert np.isfinite(value[0]) and np.all(np.isfinite(gradient))
+    assert len(traces) == 1
+
+
+def test_friction_has_one_program_for_every_place(traces):
+    nuisances = prepare(noisy_record(MODEL, n=130), MODEL)
+    for at in ((0, 1), (1, 2)):
+        posterior = Posterior(hypothesis(MODEL, jfsm.Coulomb(0.5, at=at), nuisances), [nuisances])
+        assert np.isfinite(posterior.evaluate(posterior.initial())[0][0])
+    assert len(traces) == 1
