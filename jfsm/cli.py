@@ -5,7 +5,9 @@ Whatever is slow to import is imported by the command that needs it.
 """
 
 import functools
+import os
 import re
+import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -404,5 +406,19 @@ def _key(seed: int | None) -> "jax.Array | None":
     return None if seed is None else jax.random.key(seed)
 
 
+def main() -> None:
+    """The program ``jfsm``."""
+    try:
+        app()
+    except SystemExit as end:
+        if end.code == NOT_FINISHED:
+            # Amid tracing an interrupt leaves jaxlib in a state that crashes when it is torn down, which would turn
+            # the exit code into that of a segmentation fault. Everything has been said: leave at once.
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(NOT_FINISHED)
+        raise
+
+
 if __name__ == "__main__":
-    app()
+    main()

@@ -4,9 +4,11 @@ import errno
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
+from time import sleep
 from types import SimpleNamespace
 from typing import Any
 
@@ -201,6 +203,20 @@ def test_an_interrupted_diagnosis_says_so_and_leaves_no_file(channels, folder, t
     result = run("diagnose", *channels, "--model", folder / "model.toml", *outputs)
     assert result.exit_code == 3
     assert result.stderr == "jfsm: Stopped before the end; no file was left half written.\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_process_that_is_interrupted_at_work_ends_with_its_own_code(tmp_path):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "jfsm.cli", "demo", "--report", str(tmp_path / "page.html")],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=Path(__file__).resolve().parents[1],
+    )  # fmt: skip
+    assert process.stdout is not None
+    assert process.stdout.readline().startswith("A made-up record")
+    sleep(1.0)  # by then the first program is being traced
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert (process.returncode, errors) == (3, "jfsm: Stopped before the end; no file was left half written.\n")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -1,5 +1,6 @@
 """The likelihood: its derivatives against finite differences, its lanes against each other, its programs counted."""
 
+import itertools
 from dataclasses import replace
 
 import equinox as eqx
@@ -115,8 +116,22 @@ def test_the_information_is_made_of_the_slopes_of_the_innovations(kind, request)
     weak = np.array([u.heavy for u in posterior.hypothesis.unknowns[0]])  # their prior's curvature depends on theta
     scale = np.sqrt(np.outer(np.diag(likelihood), np.diag(likelihood))) + np.diag(known) + 1e-9
     off = (found - likelihood - np.diag(np.where(weak, np.diag(found - likelihood), known))) / scale
-    np.testing.assert_allclose(off, 0.0, atol=1e-4)
+    # An instant of reversal that changes its step between the two differences costs friction some accuracy.
+    np.testing.assert_allclose(off, 0.0, atol=1e-4 if kind == "smooth" else 1e-3)
     assert np.all(np.diag(found) >= np.diag(likelihood) * (1 - 1e-4)), "a prior law adds information"
+
+
+@pytest.mark.parametrize("names", [("stiffness", "stiffness@0-1"), ("stiffness@0-1", "stiffness")])
+def test_the_most_particular_statement_of_trust_counts_in_whatever_order_it_came(names):
+    trust = {name: {"stiffness": 0.05, "stiffness@0-1": 0.5}[name] for name in names}
+    widths = [own_unknown(MODEL, path, trust).width for path in MODEL.select("stiffness")]
+    assert widths == pytest.approx(np.log1p([0.5, 0.05]))
+    assert own_unknown(MODEL, "mass@1", trust).width == own_unknown(MODEL, "mass@1", {}).width
+
+
+def test_a_value_of_zero_cannot_be_refitted_as_a_share_of_itself():
+    with pytest.raises(ValueError, match="damping@0-1.c is 0 and cannot be refitted as a share of itself; state a"):
+        own_unknown(jfsm.Structure.sdof(1.0, 9.0), "damping@0-1.c", {})
 
 
 def test_two_lanes_are_what_each_of_them_is_alone(chain_nuisances, smooth):
@@ -148,7 +163,7 @@ def test_the_likelihoods_of_two_records_add_up(chain_nuisances, smooth):
 
 
 def test_samples_after_the_end_that_counts_have_no_part(chain_nuisances, smooth):
-    until = 150
+    until = 195
     torn = chain_nuisances.readings.values.at[until:].add(0.5)
     spoiled = replace(chain_nuisances, readings=eqx.tree_at(lambda r: r.values, chain_nuisances.readings, torn))
     values = [
@@ -167,21 +182,30 @@ def traces(monkeypatch) -> list[None]:
     return found
 
 
-def test_one_program_serves_every_smooth_law_at_every_place_with_either_sign(traces):
-    # A length that no other test has, so that the program cannot be there already.
-    nuisances = prepare(noisy_record(MODEL, n=130), MODEL)
+def test_one_program_serves_every_smooth_law_at_every_place_with_either_sign(chain_nuisances, smooth, traces):
+    smooth.evaluate(smooth.initial())
+    traces.clear()
     laws = (jfsm.CubicStiffness, jfsm.QuadraticStiffness, jfsm.QuadraticDamping)
-    terms = [None, *(law(size, at=at) for law in laws for size in (0.3, -0.3) for at in ((0, 1), (1, 2), (0, 2)))]
-    for term in terms:
-        posterior = Posterior(hypothesis(MODEL, term, nuisances), [nuisances])
+    for law, size, at in itertools.product(laws, (0.3, -0.3), ((0, 1), (1, 2), (0, 2))):
+        posterior = Posterior(hypothesis(MODEL, law(size, at=at), chain_nuisances), [chain_nuisances])
         value, gradient, _ = posterior.evaluate(posterior.initial())
         assert np.isfinite(value[0]) and np.all(np.isfinite(gradient))
-    assert len(traces) == 1
+    assert not traces
 
 
-def test_friction_has_one_program_for_every_place(traces):
-    nuisances = prepare(noisy_record(MODEL, n=130), MODEL)
-    for at in ((0, 1), (1, 2)):
-        posterior = Posterior(hypothesis(MODEL, jfsm.Coulomb(0.5, at=at), nuisances), [nuisances])
+def test_friction_has_one_program_for_every_place(single_nuisances, friction, traces):
+    friction.evaluate(friction.initial())
+    traces.clear()
+    for at in ((0, 1), (1, 0)):
+        posterior = Posterior(hypothesis(SINGLE, jfsm.Coulomb(0.5, at=at), single_nuisances), [single_nuisances])
         assert np.isfinite(posterior.evaluate(posterior.initial())[0][0])
-    assert len(traces) == 1
+    assert not traces
+
+
+def test_records_of_like_length_share_a_program_wherever_they_end(chain_nuisances, smooth, traces):
+    smooth.evaluate(smooth.initial())
+    traces.clear()
+    Posterior(smooth.hypothesis, [chain_nuisances], [194]).evaluate(smooth.initial())
+    longer = prepare(noisy_record(MODEL, n=N + 5), MODEL)
+    Posterior(hypothesis(MODEL, CUBIC, longer), [longer]).evaluate(smooth.initial())
+    assert not traces

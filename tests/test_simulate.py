@@ -445,6 +445,12 @@ def test_the_response_of_a_record_at_rest_has_no_part_in_its_run():
         (MODEL, RECORD, {"initial_state": ([0.0, 1.0], 0.0)}, r"displacement must have one value per degree .*\(1\)"),
         (CHAIN, CHAIN_RECORD, {"initial_state": ([0.0, 1.0], 0.0)}, r"velocity must have one value .* \(2\); got 1"),
         (MODEL, RECORD, {"initial_state": (0.0, np.nan)}, "`initial_state velocity` must be finite"),
+        (
+            MODEL,
+            RECORD,
+            {"reconstruction": "cubic"},
+            "`reconstruction` must be .band-limited., .linear. or .hold.; got",
+        ),
         (MODEL, jfsm.Record(TIME**1.2, FORCE), {}, r"`time` must have uniform steps .* record\.resample\("),
     ],
 )

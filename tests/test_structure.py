@@ -122,6 +122,11 @@ def test_adding_leaves_the_structure_as_it_was():
     assert longer.trust == model.trust == (("stiffness", 0.05),)
 
 
+def test_trust_stated_later_adds_to_what_was_stated_before():
+    model = jfsm.Structure.sdof(1.0, 9.0, 0.1).uncertain(stiffness=0.05).uncertain(mass=0.1, stiffness=0.2)
+    assert dict(model.trust) == {"stiffness": 0.2, "mass": 0.1}
+
+
 def test_links_are_the_places_that_carry_a_term_each_once():
     assert full().links == ((0, 1), (1, 2), (2, 1), (0, 2))
 

@@ -41,8 +41,7 @@ def residual(structure: Structure, nuisances: Nuisances, until: int, at: tuple[i
     n = nuisances.samples
     readings, fine = nuisances.readings, nuisances.fine
     found = latent_force(
-        plant, nuisances.show, nuisances.record.time, np.asarray(fine.force)[:n, 0], np.asarray(fine.base)[:n, 0],
-        np.asarray(readings.values)[:n], np.asarray(readings.use)[:n],
+        plant, nuisances.show, fine, np.asarray(readings.values)[:n], np.asarray(readings.use)[:n],
         readings.variance, nuisances.force_variance, nuisances.omega, nuisances.length,
     )  # fmt: skip
     links = list(structure.links)

@@ -1,6 +1,6 @@
 """The force between its samples."""
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from jaxtyping import Float
@@ -23,6 +23,8 @@ def reconstruct(
     made that way. On a resonance with nine samples a period the choice is worth a factor of three in the error of a
     simulation, so it is the drive's, never the solver's.
     """
+    if method not in get_args(Reconstruction):
+        raise ValueError(f'`reconstruction` must be "band-limited", "linear" or "hold"; got {method!r}.')
     n = samples.shape[0]
     if factor == 1:
         return samples.copy()

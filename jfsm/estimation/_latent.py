@@ -3,8 +3,8 @@ r"""The force that a model lacks, as a hidden state: Kalman filter and Rauch-Tun
     M ẍ + C ẋ + K x + r = g,     ṙ = -r/τ + w,
 
 r is an Ornstein-Uhlenbeck process per degree of freedom, its amplitude and its memory τ chosen by likelihood among a
-few. Whatever the model says of nonlinear terms is inside r, and is taken off afterwards. The force runs straight
-between samples here: this is for pictures, maps and first guesses, not for the likelihood of a hypothesis.
+few. Whatever the model says of nonlinear terms is inside r, and is taken off afterwards. This is for pictures and maps,
+not for the likelihood of a hypothesis.
 """
 
 from dataclasses import dataclass
@@ -17,6 +17,7 @@ import numpy as np
 import scipy.linalg
 from jaxtyping import Array, Float
 
+from ..dynamics._grid import Fine
 from ..dynamics._plant import Plant, Readout, friction_limits, smooth_force
 
 _MEMORIES = (0.15, 1.0)
@@ -46,7 +47,7 @@ class Latent:
 
 class _Model(eqx.Module):
     step: Float[Array, "state state"]
-    by_force: Float[Array, "2 state dof"]
+    by_force: Float[Array, "halves state dof"]
     noise: Float[Array, "state state"]
     rows: Float[Array, "channels state"]
     through: Float[Array, "channels dof"]
@@ -54,7 +55,7 @@ class _Model(eqx.Module):
 
 
 def latent_force(
-    plant: Plant, show: Readout, time, force, base, values, use, variance, force_variance, omega: float, length: float
+    plant: Plant, show: Readout, fine: Fine, values, use, variance, force_variance, omega: float, length: float
 ) -> Latent:
     """Smoothed motion and missing force.
 
@@ -62,21 +63,33 @@ def latent_force(
     ----------
     plant : Plant
         With its sensors' gains and offsets.
-    force, base, values, use : (n, dof), (n,), (n, channels), (n, channels) arrays
-        Measured force, acceleration of the base, readings, and which of them count.
+    fine : Fine
+        What drives the record, at least as long as the readings.
+    values, use : (n, channels) arrays
+        Readings, and which of them count.
     variance, force_variance : (channels,), (dof,) arrays
     omega, length : float
         Angular frequency [rad/s] and size of the motion.
     """
-    time = np.asarray(time)
-    dt = float(time[1] - time[0])
-    true = (np.asarray(force) - np.asarray(plant.force_offset)) / (1 + np.asarray(plant.force_gain))
-    true = true - np.asarray(base)[:, None] * np.asarray(plant.mass).sum(1)
+    n, dt = len(values), float(fine.step)
+    base = np.asarray(fine.base)[:n]
+    true = (np.asarray(fine.force)[:n] - np.asarray(plant.force_offset)) / (1 + np.asarray(plant.force_gain))
+    true = true - base[..., None] * np.asarray(plant.mass).sum(1)
     seen = (np.asarray(values) - np.asarray(plant.channel_offset)) / (1 + np.asarray(plant.channel_gain))
     acceleration = np.array([kind == "acceleration" for kind in show.kinds])
-    seen = seen - np.asarray(base)[:, None] * acceleration
+    seen = seen - base[:, :1] * acceleration
     models = [
-        _model(plant, show, dt, tau / omega, share * omega**2 * length, np.asarray(force_variance), omega, length)
+        _model(
+            plant,
+            show,
+            dt,
+            fine.substeps,
+            tau / omega,
+            share * omega**2 * length,
+            np.asarray(force_variance),
+            omega,
+            length,
+        )
         for tau, share in product(_MEMORIES, _AMPLITUDES)
     ]
     stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *models)
@@ -86,11 +99,11 @@ def latent_force(
     mean, std = (np.asarray(out) for out in _smooth(best, *data))
     dof = plant.dof
     x, v, r = mean[:, :dof], mean[:, dof : 2 * dof], mean[:, 2 * dof :]
-    known = np.asarray(_nonlinear(plant, jnp.asarray(x), jnp.asarray(v), jnp.asarray(time)))
+    known = np.asarray(_nonlinear(plant, jnp.asarray(x), jnp.asarray(v), fine.time[:n]))
     return Latent(x, v, r - known, std[:, 2 * dof :])
 
 
-def _model(plant: Plant, show: Readout, dt, tau, amplitude, force_variance, omega, length) -> _Model:
+def _model(plant: Plant, show: Readout, dt, substeps, tau, amplitude, force_variance, omega, length) -> _Model:
     dof = plant.dof
     minv = np.linalg.inv(np.asarray(plant.mass))
     zero, eye = np.zeros((dof, dof)), np.eye(dof)
@@ -98,11 +111,13 @@ def _model(plant: Plant, show: Readout, dt, tau, amplitude, force_variance, omeg
     rate = np.block([[zero, eye, zero], [-minv @ k, -minv @ c, -minv], [zero, zero, -eye / tau]])
     gain = np.concatenate([zero, minv, zero])
     n = 3 * dof
-    # A force that runs straight over the step: exponential of the chained system (state, force, slope of the force).
-    chain = np.zeros((n + 2 * dof, n + 2 * dof))
-    chain[:n, :n], chain[:n, n : n + dof], chain[n : n + dof, n + dof :] = rate, gain, eye / dt
-    exponential = scipy.linalg.expm(chain * dt)
-    whole, ramp = exponential[:n, n : n + dof], exponential[:n, n + dof :]
+    # Simpson's rule over the half steps of the force, each carried to the end of the sample by the free motion.
+    nodes = 2 * substeps + 1
+    weight = (
+        dt / (6 * substeps) * np.array([1.0 if j in (0, nodes - 1) else 4.0 if j % 2 else 2.0 for j in range(nodes)])
+    )
+    carried = np.array([w * scipy.linalg.expm(rate * dt * (1 - j / (nodes - 1))) @ gain for j, w in enumerate(weight)])
+    step = scipy.linalg.expm(rate * dt)
     mass = np.diag(np.asarray(plant.mass))
     noise = np.zeros((n, n))
     noise[dof : 2 * dof, dof : 2 * dof] = minv @ np.diag(force_variance * dt**2) @ minv.T
@@ -120,7 +135,7 @@ def _model(plant: Plant, show: Readout, dt, tau, amplitude, force_variance, omeg
     sizes = np.concatenate([np.full(dof, length), np.full(dof, length * omega), amplitude * mass])
     start = np.diag((_WIDE * sizes) ** 2)
     return _Model(
-        *(jnp.asarray(a) for a in (exponential[:n, :n], np.stack([whole - ramp, ramp]), noise, rows, through, start))
+        *(jnp.asarray(a) for a in (step, carried, noise, rows, through, start))
     )
 
 
@@ -129,23 +144,22 @@ def _filter(model: _Model, force, values, use, variance):
 
     def body(carry, inputs):
         mean, covariance = carry
-        g, after, y, counted = inputs
+        g, y, counted = inputs
         predicted = (mean, covariance)
         total = jnp.zeros(())
         for c in range(y.shape[0]):
             row = model.rows[c]
             cross = jnp.sum(covariance * row[None, :], 1)
             spread = jnp.sum(row * cross) + variance[c]
-            error = y[c] - jnp.sum(row * mean) - jnp.sum(model.through[c] * g)
+            error = y[c] - jnp.sum(row * mean) - jnp.sum(model.through[c] * g[0])
             weight = counted[c] * cross / spread
             mean, covariance = mean + weight * error, covariance - weight[:, None] * cross[None, :]
             total = total - 0.5 * counted[c] * (error**2 / spread + jnp.log(spread))
-        moved = model.step @ mean + model.by_force[0] @ g + model.by_force[1] @ after
+        moved = model.step @ mean + jnp.einsum("hsd,hd->s", model.by_force, g)
         return (moved, model.step @ covariance @ model.step.T + model.noise), (*predicted, mean, covariance, total)
 
-    following = jnp.concatenate([force[1:], force[-1:]])
     start = (jnp.zeros(model.start.shape[0]), model.start)
-    return jax.lax.scan(body, start, (force, following, values, use))[1]
+    return jax.lax.scan(body, start, (force, values, use))[1]
 
 
 @jax.jit

@@ -16,7 +16,9 @@ from ._posterior import Hypothesis, Posterior
 from ._unknowns import Unknown, bounded, free_unknown, nuisance_unknowns, with_offsets
 
 _TIED = 0.98
-"""Correlation from which two values cannot be told apart in practice."""
+"""Correlation from which two values cannot be told apart in practice,"""
+_SURE = 0.05
+"""unless each is known to this relative standard error all the same."""
 _LOOSE = 0.5
 """Relative standard error from which a value is hardly determined."""
 
@@ -159,6 +161,13 @@ def _bounded(unknowns: list[Unknown], bounds: Mapping[str, tuple[float, float]],
             )
         if not low < high:
             raise ValueError(f"`bounds` of {name!r} must be (low, high) with low < high; got ({low}, {high}).")
+        for unknown in unknowns:
+            if unknown.path in paths and unknown.log and not max(low / unknown.unit, high / unknown.unit) > 0:
+                sign = "positive" if unknown.unit > 0 else "negative"
+                raise ValueError(
+                    f"`bounds` of {name!r} must leave room for a {sign} value, as {unknown.path} has in the model; "
+                    f"got ({low}, {high})."
+                )
         unknowns = [bounded(u, low, high) if u.path in paths else u for u in unknowns]
     return unknowns
 
@@ -168,14 +177,18 @@ def _words(
 ) -> tuple[str, ...]:
     """What the records cannot tell."""
     words = []
+    relative = {
+        u.path: s if u.log else s / max(abs(t), 1e-300) for u, t, s in zip(unknowns, theta, error, strict=False)
+    }
     for (a, b), r in pairs.items():
-        if abs(r) > _TIED:
-            joint = "their ratio" if r > 0 else "their product"
+        if abs(r) > _TIED and min(relative[a], relative[b]) > _SURE:
+            joint = "their ratio" if r > 0 else "what they do together"
             words.append(f"{a} and {b} cannot be told apart by this record (correlation {r:+.3f}); {joint} can.")
-    for u, t, s in zip(unknowns, theta, error, strict=False):
-        relative = s if u.log else s / max(abs(t), 1e-300)
-        if relative > _LOOSE:
-            words.append(f"{u.path} is hardly determined by this record (relative standard error {relative:.0%}).")
+    for u, t in zip(unknowns, theta, strict=False):
+        if relative[u.path] > _LOOSE:
+            words.append(
+                f"{u.path} is hardly determined by this record (relative standard error {relative[u.path]:.0%})."
+            )
         if t <= u.low or t >= u.high:
             words.append(f"{u.path} ends at its bound {u.value(t):.6g}.")
     return tuple(words)

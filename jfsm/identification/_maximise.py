@@ -12,6 +12,8 @@ LADDER = (1.0, 0.3, 0.1, 0.03, 0.01)
 """Shares of unmodelled force that the first rungs forgive: the top ones compare forces and have wide basins."""
 _LAST_RUNG = 0.003
 _RUNG_STEPS, _LAST_RUNG_STEPS, _RUNG_ENOUGH = 3, 10, 0.5
+_RUNG_SAMPLES = 4096
+"""Samples of a record, its first ones, that the rungs use: they only lead to a basin."""
 _ENOUGH = 0.01
 """A step that promises less than this many nats is the last,"""
 _HOPELESS = 0.02
@@ -45,8 +47,8 @@ def approach(posterior: Posterior, ladder: Sequence[float] = LADDER, theta: np.n
     """
     theta = posterior.initial() if theta is None else theta
     for share in ladder[:-1]:
-        theta = _climb(posterior, theta, share, _RUNG_STEPS, _RUNG_ENOUGH).theta
-    return _climb(posterior, theta, ladder[-1], _LAST_RUNG_STEPS, _RUNG_ENOUGH)
+        theta = _climb(posterior, theta, share, _RUNG_STEPS, _RUNG_ENOUGH, most=_RUNG_SAMPLES).theta
+    return _climb(posterior, theta, ladder[-1], _LAST_RUNG_STEPS, _RUNG_ENOUGH, most=_RUNG_SAMPLES)
 
 
 def finish(posterior: Posterior, start: Maximum, steps: int = 25, best: float = np.inf) -> Maximum:
@@ -65,14 +67,20 @@ def maximise(posterior: Posterior) -> Maximum:
 
 
 def _climb(
-    posterior: Posterior, theta: np.ndarray, slack: float, steps: int, enough: float, best: float = np.inf
+    posterior: Posterior,
+    theta: np.ndarray,
+    slack: float,
+    steps: int,
+    enough: float,
+    best: float = np.inf,
+    most: int | None = None,
 ) -> Maximum:
     unknowns = posterior.hypothesis.unknowns
     low = np.array([[u.low for u in row] for row in unknowns])
     high = np.array([[u.high for u in row] for row in unknowns])
     log = np.array([[u.log for u in row] for row in unknowns])
     lanes = theta.shape[0]
-    value, gradient, information = _finite(posterior.evaluate(theta, slack))
+    value, gradient, information = _finite(posterior.evaluate(theta, slack, most))
     damp = np.full(lanes, 1e-3)
     open_, results = np.ones(lanes, bool), [Result.maximum_steps] * lanes
     for _ in range(steps):
@@ -87,7 +95,7 @@ def _climb(
         if not np.any(open_):
             break
         trial = np.where(open_[:, None], theta + move, theta)
-        tried, slope, curve = _finite(posterior.evaluate(trial, slack))
+        tried, slope, curve = _finite(posterior.evaluate(trial, slack, most))
         better = open_ & (tried < value)
         theta = np.where(better[:, None], trial, theta)
         value = np.where(better, tried, value)

@@ -61,11 +61,17 @@ class Posterior:
         """Starting values (lanes, unknowns)."""
         return np.array([[u.theta for u in unknowns] for unknowns in self.hypothesis.unknowns])
 
-    def evaluate(self, theta: np.ndarray, slack: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Minus log-posterior (lanes,), gradient and information; `slack` is the share of unmodelled force forgiven."""
+    def evaluate(
+        self, theta: np.ndarray, slack: float = 0.0, most: int | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Minus log-posterior (lanes,), gradient and information.
+
+        `slack` is the share of unmodelled force forgiven; of every record at most `most` samples count.
+        """
         lanes, size = theta.shape
         value, gradient, information = np.zeros(lanes), np.zeros((lanes, size)), np.zeros((lanes, size, size))
-        for nuisances, until, (plant, maps, mine) in zip(self.records, self.until, self._parts, strict=True):
+        for nuisances, end, (plant, maps, mine) in zip(self.records, self.until, self._parts, strict=True):
+            until = end if most is None else min(end, most)
             width = maps.unit.shape[1]
             inner = np.zeros((len(self._pick), width))
             inner[:, : len(mine)] = theta[self._pick][:, mine]

@@ -29,7 +29,7 @@ LONGEST_WORD = 16
 TONES = {"good": "green", "change": "cyan", "open": "yellow"}
 MOST_CANDIDATES = 8
 WIDE = 100
-"""Characters in a line from which a candidate's errors and the reason against it are shown; the page has them always."""
+"""Characters in a line from which a candidate's errors and the reason against it are shown; the page has them too."""
 ESSENTIAL = ("cause", "place", "evidence [nats]", "explains", "probability")
 
 
