@@ -82,8 +82,8 @@ def sticking_motion(
     def ends(link, mode) -> Callable[[float, np.ndarray], float]:
         def margin(t, state):
             if mode[link]:
-                return mode[link] * (links[link] @ state[dof:])
-            return limits[link] - abs(split(t, state, mode)[1][link])
+                return float(mode[link] * (links[link] @ state[dof:]))
+            return float(limits[link] - abs(split(t, state, mode)[1][link]))
 
         margin.terminal, margin.direction = True, -1.0  # pyright: ignore[reportFunctionMemberAccess]
         return margin

@@ -1,12 +1,14 @@
 """Values from records: what is found, how sure it is, and what the records cannot tell."""
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from references import smooth_motion
 
 import jfsm
+from jfsm.identification import _nuisances
 from jfsm.structures import Offset
 
 N, DT = 300, 0.05
@@ -74,6 +76,13 @@ def test_the_noise_that_was_added_is_found():
     found = linear_fit().noise
     assert set(found) == {"displacement 1"}
     assert found["displacement 1"] == pytest.approx(NOISE * np.std(motion(0.0, True)), rel=0.15)
+
+
+def test_a_first_guess_of_the_noise_that_is_twice_too_large_is_corrected(monkeypatch):
+    honest = _nuisances.noise_floor
+    monkeypatch.setattr(_nuisances, "noise_floor", lambda *args: replace(honest(*args), std=2 * honest(*args).std))
+    found = jfsm.fit(GUESS, measured()).noise["displacement 1"]
+    assert found == pytest.approx(NOISE * np.std(motion(0.0, True)), rel=0.15)
 
 
 def test_the_fit_reproduces_the_record_to_its_noise():

@@ -2,6 +2,7 @@
 
 import itertools
 from pathlib import Path
+from typing import Any, cast
 
 import jax.numpy as jnp
 import numpy as np
@@ -156,8 +157,16 @@ SPRING = jfsm.LinearStiffness(1.0, at=(0, 1))
         (lambda: jfsm.Structure([[1.0, 2.0], [2.0, 1.0]]), ValueError, "must be positive definite; .* is -1"),
         (lambda: jfsm.Structure([np.nan]), ValueError, "`mass` must be finite; 1 of 1 values"),
         (lambda: jfsm.Structure(["one"]), TypeError, "`mass` must hold real numbers"),
-        (lambda: jfsm.Structure([1.0], [3.0]), TypeError, r"`terms` must hold terms such as jfsm\.LinearStiffness"),
-        (lambda: jfsm.Structure([1.0], sensors=[SPRING]), TypeError, "`sensors` must hold sensor effects such as"),
+        (
+            lambda: jfsm.Structure([1.0], cast(Any, [3.0])),
+            TypeError,
+            r"`terms` must hold terms such as jfsm\.LinearStiffness",
+        ),
+        (
+            lambda: jfsm.Structure([1.0], sensors=cast(Any, [SPRING])),
+            TypeError,
+            "`sensors` must hold sensor effects such as",
+        ),
         (lambda: jfsm.Structure([1.0], [jfsm.Coulomb(1.0, at=(1, 2))]), ValueError, r"\(1, 2\) of coulomb names a deg"),
         (lambda: jfsm.Structure([1.0]) + Offset(1.0, at=("force", 2)), ValueError, "of offset names a degree of free"),
         (lambda: jfsm.Structure([1.0]) + 3.0, TypeError, "unsupported operand"),  # pyright: ignore[reportOperatorIssue]

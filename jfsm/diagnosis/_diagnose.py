@@ -105,14 +105,15 @@ def diagnose(
 
 
 class _Steps:
-    """Counts steps for a progress display; `more` steps may turn up on the way."""
+    """Counts steps for a progress display; `more` of them may turn up on the way."""
 
-    def __init__(self, progress: Progress | None, total: int):
-        self.progress, self.done, self.total = progress, 0, total
+    def __init__(self, progress: Progress | None, least: int):
+        self.progress, self.done, self.least, self.total = progress, 0, least, least
 
     def next(self, what: str, more: int = 0) -> None:
+        self.total = max(self.total, self.least + more)
         if self.progress is not None:
-            self.progress(what, self.done, self.total + more)
+            self.progress(what, self.done, self.total)
         self.done += 1
 
 

@@ -12,7 +12,7 @@ from .._types import as_array
 from ..records import Record
 from ..structures import Structure
 from ._drive import Reconstruction
-from ._excitation import excitation, substeps_for
+from ._excitation import bucket, excitation, substeps_for
 from ._grid import run_grid
 from ._plant import lower, readout
 
@@ -59,16 +59,19 @@ def _least_squares(model: Structure, head: Record, reconstruction: Reconstructio
     channels = tuple(head.responses)
     y = np.column_stack([head.responses[c] for c in channels])
     spread = np.maximum(np.std(y, axis=0), 1e-12 * np.max(np.abs(y)) + 1e-300)
-    fine = excitation(head, model.dof, substeps_for(model, head.dt), reconstruction)
+    padded = bucket(len(head))
+    fine = excitation(head, model.dof, substeps_for(model, head.dt), reconstruction, length=padded)
+    counted = jnp.asarray(np.arange(padded) < len(head), dtype=jnp.float64)
     plant, show = lower(model, channels), readout(channels, model.dof)
     offset = y - np.asarray(plant.channel_offset)
     state = np.zeros(2 * model.dof)
     for i, (kind, j) in enumerate(channels):  # a measured channel is its own best first guess
         if kind in ("displacement", "velocity"):
             state[(j - 1) + (model.dof if kind == "velocity" else 0)] = offset[0, i]
+    readings = jnp.asarray(np.pad(y, ((0, padded - len(head)), (0, 0))))
     damp, best = 1e-6, None
     for _ in range(_ITERATIONS):
-        residual, slope = _residuals(plant, show, fine, jnp.asarray(y), jnp.asarray(spread), jnp.asarray(state))
+        residual, slope = _residuals(plant, show, fine, readings, jnp.asarray(spread), counted, jnp.asarray(state))
         residual, slope = np.asarray(residual), np.asarray(slope)
         cost = float(residual @ residual) if np.all(np.isfinite(residual)) else np.inf
         if best is None or cost < best[0]:
@@ -89,7 +92,7 @@ def _least_squares(model: Structure, head: Record, reconstruction: Reconstructio
 
 
 @eqx.filter_jit
-def _residuals(plant, show, fine, y, spread, state):
+def _residuals(plant, show, fine, y, spread, counted, state):
     dof = plant.dof
 
     def residual(state):
@@ -97,7 +100,8 @@ def _residuals(plant, show, fine, y, spread, state):
         shown = {"displacement": x, "velocity": v, "acceleration": a + fine.base[:, :1]}
         seen = jnp.stack([shown[kind] @ row for kind, row in zip(show.kinds, show.select, strict=True)], 1)
         shown_by_sensors = (1 + plant.channel_gain)[None, :] * seen + plant.channel_offset[None, :]
-        return ((shown_by_sensors - y) / spread[None, :]).ravel()
+        misfit = (shown_by_sensors - y) / spread[None, :]
+        return jnp.where(counted[:, None] > 0, misfit, 0.0).ravel()
 
     jacobian = jax.vmap(partial(jax.jvp, residual, (state,)), out_axes=(None, 1))
     value, slope = jacobian((jnp.eye(2 * dof),))

@@ -134,9 +134,7 @@ def _model(plant: Plant, show: Readout, dt, substeps, tau, amplitude, force_vari
     )
     sizes = np.concatenate([np.full(dof, length), np.full(dof, length * omega), amplitude * mass])
     start = np.diag((_WIDE * sizes) ** 2)
-    return _Model(
-        *(jnp.asarray(a) for a in (step, carried, noise, rows, through, start))
-    )
+    return _Model(*(jnp.asarray(a) for a in (step, carried, noise, rows, through, start)))
 
 
 def _filter(model: _Model, force, values, use, variance):

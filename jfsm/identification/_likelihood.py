@@ -66,15 +66,13 @@ def derivatives(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, 
 
         push = partial(jax.jvp, outcome, (theta,))
         (error, log_variance), (by_error, by_variance) = jax.vmap(push, out_axes=(None, 0))((jnp.eye(theta.size),))
-        deviation = jnp.sqrt(counted) * jnp.exp(-log_variance / 2)
-        e, de, ds = error * deviation, by_error * deviation, by_variance * jnp.sqrt(counted)
+        root = jnp.sqrt(counted)
+        deviation = root * jnp.exp(-log_variance / 2)
+        e, de, ds = error * deviation, by_error * deviation[None], by_variance * root[None]
         value = 0.5 * jnp.sum(e**2 + counted * (log_variance + jnp.log(2 * jnp.pi)))
-        flat = lambda array: array.reshape(array.shape[0], -1)  # noqa: E731
-        gradient = (
-            flat(de) @ e.ravel()
-            + 0.5 * flat(ds) @ (jnp.sqrt(counted) - e**2 / jnp.maximum(jnp.sqrt(counted), 1e-30)).ravel()
-        )
-        return value, gradient, flat(de) @ flat(de).T + 0.5 * flat(ds) @ flat(ds).T
+        de, ds = (array.reshape(theta.size, -1) for array in (de, ds))
+        gradient = de @ e.ravel() + 0.5 * ds @ (root - e**2 / jnp.maximum(root, 1e-30)).ravel()
+        return value, gradient, de @ de.T + 0.5 * ds @ ds.T
 
     mapped = jax.vmap(one, in_axes=(_axes(plant), 0, 0, 0, 0, 0))
     return mapped(plant, lanes.base, lanes.rows, lanes.unit, lanes.log, theta)
