@@ -3,6 +3,8 @@
 A sample on fixed seeds; `benchmarks/blind.py` runs any number on any seed.
 """
 
+from typing import Any
+
 import jax
 import pytest
 
@@ -20,7 +22,8 @@ SLOW = [(20 + i, cause) for i, cause in enumerate((*LAWS, *GAINS, *VALUES, "none
 
 def diagnosed(seed: int, cause: str):
     challenge = draw(seed, causes=cause, noise=0.01, channels="xva")
-    record = jfsm.Record(challenge.time, at_rest=challenge.at_rest, **challenge.channels)
+    channels: dict[str, Any] = dict(challenge.channels)
+    record = jfsm.Record(challenge.time, at_rest=challenge.at_rest, **channels)
     believed = challenge.model
     model = jfsm.Structure.sdof(believed.mass, believed.stiffness, believed.damping)
     return challenge, jfsm.diagnose(record, model, holdout=0.3, key=jax.random.key(seed))
