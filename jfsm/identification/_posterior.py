@@ -86,7 +86,7 @@ class Posterior:
                 readings,
                 slackened(nuisances, slack),
                 scale,
-                until,
+                jnp.asarray(until),  # as a plain number it would be part of the program
             )
             v, g, f = (np.asarray(o)[:lanes] for o in out)
             value += v
