@@ -206,6 +206,7 @@ def test_an_interrupted_diagnosis_says_so_and_leaves_no_file(channels, folder, t
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow  # it waits for a compiler that may swallow an interrupt
 def test_a_process_that_is_interrupted_at_work_ends_with_its_own_code(tmp_path):
     process = subprocess.Popen(
         [sys.executable, "-m", "jfsm.cli", "demo", "--report", str(tmp_path / "page.html")],
@@ -222,6 +223,8 @@ def test_a_process_that_is_interrupted_at_work_ends_with_its_own_code(tmp_path):
             break
         except subprocess.TimeoutExpired:
             continue
+    process.kill()
+    process.wait()
     assert process.returncode == 3
     assert errors.endswith("jfsm: Stopped before the end; no file was left half written.\n")
     assert list(tmp_path.iterdir()) == []
