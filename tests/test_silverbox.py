@@ -26,4 +26,6 @@ def test_a_cubic_spring_is_named_on_the_measured_circuit(shared_data):
     assert ratio == pytest.approx(3.95, rel=0.03)  # published, 1/V²
     assert finding.parameters["k3"].unit == "V/V^3"
     assert d.gain is not None
-    assert d.gain.channels["displacement 1"].after < 0.5e-3  # V; the linear model leaves 7 mV
+    gain = d.gain.channels["displacement 1"]
+    assert gain.after < 0.1 * gain.before
+    assert gain.after < 1.2 * gain.floor  # so short a start leaves half a millivolt by itself

@@ -22,6 +22,8 @@ NEGLIGIBLE = 0.02
 """Excess, as a share of the signal, below which nothing but a perfect explanation is a finding."""
 _NOTICEABLE = 0.1
 """Excess, as a share of the power that noise leaves, from which a set says anything about an effect."""
+_NEARLY_ALL, _MUCH = 0.8, 0.1
+"""Explaining less than this share of the excess and leaving more than this share of the signal, a law is a neighbour."""
 _WHITE = 0.1
 _SCALE = 0.5
 _LOOKS = (10.0, 40.0)
@@ -81,11 +83,11 @@ def probabilities(trials: Sequence[Trial], periods: float) -> np.ndarray:
 
 
 def decide(
-    given: Trial, refitted: Trial, tried: Sequence[Trial], stand_in: Callable[[], Trial | None], periods: float
+    given: Trial, refitted: Trial, tried: Sequence[Trial], stand_in: Callable[[Trial], Trial | None], periods: float
 ) -> Decision:
     """Verdict over the model as given, the model refitted, every candidate, and a map that stands for any law.
 
-    `stand_in` makes the map's trial; it is asked only where the winner leaves something.
+    `stand_in` adds to a trial the map of what it leaves; it is asked only where the winner leaves something.
     """
     kappa, why = {}, {}
     passing = []
@@ -101,7 +103,7 @@ def decide(
     for t in passing:
         if t is not winner:
             why[id(t)] = "explains it too, but is less probable"
-    mapped = None if adequate(winner) else stand_in()
+    mapped = None if adequate(winner) else stand_in(winner)
     verdict = _verdict(given, refitted, winner, tried, mapped)
     if verdict == "cause" and chance[id(winner)] < 0.5:
         families = [
@@ -114,7 +116,10 @@ def decide(
     if verdict == "consistent":
         winner = given
     elif verdict == "unnamed" and mapped is not None:
-        winner = mapped
+        # The map stands for the whole effect, not for what a law left that was not right.
+        whole = mapped if winner is refitted else stand_in(refitted)
+        winner = mapped if whole is None else whole
+        mapped = winner
         kappa[id(mapped)] = explained(mapped, refitted)
     elif verdict == "undecided" and winner.cause is not None:
         winner = refitted
@@ -151,7 +156,9 @@ def _verdict(given: Trial, refitted: Trial, winner: Trial, tried: Sequence[Trial
     # No evidence for a map: it was fitted beforehand, and held-out samples judge it.
     stands_in = mapped is not None and explained(mapped, winner) >= GATE
     if winner.cause is not None:
-        return "unnamed" if stands_in else "cause"
+        # The nearest neighbour of a law that is not in the catalogue explains much of it, and leaves much.
+        short = explained(winner, refitted) < _NEARLY_ALL and leaves(winner) > _MUCH
+        return "unnamed" if stands_in else "undecided" if short else "cause"
     if stands_in:
         return "unnamed"
     if winner is refitted and explained(refitted, given) >= GATE and leaves(refitted) < 2 * NEGLIGIBLE:

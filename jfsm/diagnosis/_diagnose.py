@@ -87,7 +87,7 @@ def diagnose(
     steps.next("the missing force")
     missing = residual(refitted.structure, records[0], until[0])
     periods = sum(n.record.duration for n in records) * records[0].omega / (2 * math.pi)
-    decision = decide(given, refitted, trials, lambda: stand_in(missing, refitted, records, until), periods)
+    decision = decide(given, refitted, trials, lambda t: stand_in(t, records, until), periods)
     extended = model if decision.verdict == "consistent" else decision.winner.extended()
     term = decision.named_term
     if term is not None:  # shown is what the law stands for: the force beside the own values that go with it

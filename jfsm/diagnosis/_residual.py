@@ -61,23 +61,24 @@ def residual(structure: Structure, nuisances: Nuisances, until: int, at: tuple[i
     return Residual(links[link], d, w, f, force_map)
 
 
-def stand_in(found: Residual, refitted: Trial, records: list[Nuisances], until: list[int]) -> Trial | None:
-    """The refitted model with the map of what it leaves, judged like any other hypothesis.
+def stand_in(trial: Trial, records: list[Nuisances], until: list[int]) -> Trial | None:
+    """A trial with the map of what it leaves, judged like any other hypothesis.
 
-    Its values are those of the refit; the map is fixed. Held-out samples are its guard against freedom.
+    Its values stay, and the map is fixed. Held-out samples are its guard against freedom.
     """
+    found = residual(trial.structure, records[0], until[0])
     table = table_of(found)
     if table is None:
         return None
-    structure = refitted.structure + table.on(found.at)
-    posterior = Posterior(Hypothesis((structure,), (refitted.unknowns,)), records, until)
+    structure = trial.structure + table.on(found.at)
+    posterior = Posterior(Hypothesis((structure,), (trial.unknowns,)), records, until)
     return replace(
-        refitted,
+        trial,
         cause=None,
         at=("map", *found.at),
         structure=structure,
         evidence=-math.inf,
-        prediction=predict(posterior, refitted.theta),
+        prediction=predict(posterior, trial.theta),
     )
 
 
