@@ -23,7 +23,7 @@ NEGLIGIBLE = 0.02
 _NOTICEABLE = 0.1
 """Excess, as a share of the power that noise leaves, from which a set says anything about an effect."""
 _NEARLY_ALL, _MUCH = 0.8, 0.1
-"""A law that explains less than this share of the excess, and leaves more than this share of the signal, is a near one."""
+"""A law that explains less than this share of the excess and leaves more than this share of the signal is near."""
 _WHITE = 0.1
 _SCALE = 0.5
 _LOOKS = (10.0, 40.0)
