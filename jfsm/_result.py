@@ -15,12 +15,3 @@ class Result(enum.Enum):
     def ok(self) -> bool:
         """Whether the answer can be used without reserve."""
         return self is Result.successful
-
-
-class DivergenceError(ArithmeticError):
-    """A free run left every bound; `time` and `state` say where."""
-
-    def __init__(self, message: str, time: float, state):
-        super().__init__(message)
-        self.time = time
-        self.state = state

@@ -85,14 +85,14 @@ def diagnose(
     refitted = fit_model("refitted", model, records, until, refit=True)
     trials = search(tried, model, given, refitted, records, until, steps.next)
     steps.next("the missing force")
-    missing = residual(refitted.structure, records[0], until[0])
     periods = sum(n.record.duration for n in records) * records[0].omega / (2 * math.pi)
     decision = decide(given, refitted, trials, lambda t: stand_in(t, records, until), periods)
     extended = model if decision.verdict == "consistent" else decision.winner.extended()
     term = decision.named_term
-    if term is not None:  # shown is what the law stands for: the force beside the own values that go with it
-        without = decision.winner.structure.without(term)
-        missing = residual(without, records[0], until[0], term.at if term.at in without.links else None)
+    # Shown beside a law is the force that it stands for, with the own values that go with it.
+    lacking = refitted.structure if term is None else decision.winner.structure.without(term)
+    at = term.at if term is not None and term.at in lacking.links else None
+    missing = residual(lacking, records[0], until[0], at)
     steps.next("the gain on held-out readings")
     gain, runs = None, []
     if held:
