@@ -92,7 +92,7 @@ def confident(row: Row) -> bool:
 
 
 def covers(row: Row) -> dict[str, bool]:
-    """For each true parameter of a rightly named finding, whether its interval holds the truth."""
+    """For each true number of a rightly named finding, whether its interval holds the truth."""
     finding = next((finding for finding in row["findings"] if finding["cause"] == row["cause"]), None)
     if finding is None:
         return {}
@@ -100,7 +100,7 @@ def covers(row: Row) -> dict[str, bool]:
     return {
         name: estimates[name]["low"] <= value <= estimates[name]["high"]
         for name, value in row["parameters"].items()
-        if name in estimates
+        if name in estimates and isinstance(value, int | float)  # a sensor's channel is a place, not a number
     }
 
 

@@ -10,6 +10,7 @@ class Result(enum.Enum):
     maximum_steps = "stopped at the largest number of iterations before it converged; the values may still move"
     stalled = "no further improvement was possible from the last values; the start may lie in the wrong basin"
     diverged = "the simulated motion left every bound; see the time of escape"
+    unfinished = "the curve ends before the range that was asked for; narrow the range, or follow it in smaller steps"
 
     @property
     def ok(self) -> bool:

@@ -113,7 +113,9 @@ def test_the_information_is_made_of_the_slopes_of_the_innovations(kind, request)
     known = np.array([1 / u.width**2 for u in posterior.hypothesis.unknowns[0]])
     found = posterior.evaluate(theta[None])[2][0]
     likelihood = slopes.T @ slopes
-    weak = np.array([u.heavy for u in posterior.hypothesis.unknowns[0]])  # their prior's curvature depends on theta
+    weak = np.array(
+        [np.isfinite(u.degrees) for u in posterior.hypothesis.unknowns[0]]
+    )  # their prior's curvature depends on theta
     scale = np.sqrt(np.outer(np.diag(likelihood), np.diag(likelihood))) + np.diag(known) + 1e-9
     off = (found - likelihood - np.diag(np.where(weak, np.diag(found - likelihood), known))) / scale
     # An instant of reversal that changes its step between the two differences costs friction some accuracy.

@@ -23,6 +23,11 @@ calls = {
     "a term": lambda: jfsm.Coulomb(1.0, at=(0, 1)),
     "a mass": lambda: jfsm.Structure([1.0]),
     "simulate": lambda: jfsm.simulate(model, record),
+    "fixed points": lambda: jfsm.fixed_points(model),
+    "linearise": lambda: jfsm.linearise(model),
+    "limit cycles": lambda: jfsm.limit_cycles(model),
+    "forced response": lambda: jfsm.forced_response(model, 1.0),
+    "backbone": lambda: jfsm.backbone(model, [1.0]),
     "fit": lambda: jfsm.fit(model, record),
     "diagnose": lambda: jfsm.diagnose(record, model),
     "a map": lambda: jfsm.RKPM.fit(np.random.default_rng(0).uniform(size=(100, 2)), np.ones(100)),
@@ -36,7 +41,10 @@ for name, call in calls.items():
 assert jax.config.jax_enable_x64 is False, "a call changed the precision"
 """
 
-DOORS = ("a structure", "a term", "a mass", "simulate", "fit", "diagnose", "a map")
+DOORS = (
+    *("a structure", "a term", "a mass", "simulate", "fit", "diagnose", "a map"),
+    *("fixed points", "linearise", "limit cycles", "forced response", "backbone"),
+)
 
 
 @pytest.fixture(scope="module")

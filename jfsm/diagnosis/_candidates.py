@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from itertools import zip_longest
 
 from ..identification import (
+    DEGREES,
+    DEGREES_BESIDE,
     Hypothesis,
     Nuisances,
     Unknown,
@@ -24,6 +26,13 @@ A softening spring that outweighs the elastic one at a peak would let the motion
 """
 
 
+SOUGHT = (
+    "cubic_hardening", "cubic_softening", "quadratic_stiffness", "coulomb", "quadratic_damping", "force_gain",
+    "accel_gain",
+)  # fmt: skip
+"""Causes that are looked for unless others are asked for."""
+
+
 @dataclass(frozen=True)
 class Candidate:
     """A cause at a place; `starts` are the structures that a fit begins from."""
@@ -34,7 +43,7 @@ class Candidate:
 
 
 def chosen_causes(selection: Sequence[str | Cause] | None) -> dict[str, Cause]:
-    """The causes to try, by id.
+    """The causes to try, by id; wrong own values are always tried.
 
     Raises
     ------
@@ -43,7 +52,7 @@ def chosen_causes(selection: Sequence[str | Cause] | None) -> dict[str, Cause]:
     """
     known = dict(causes())
     if selection is None:
-        return known
+        return {name: known[name] for name in SOUGHT}
     found = {}
     for item in selection:
         if isinstance(item, Cause):
@@ -54,7 +63,7 @@ def chosen_causes(selection: Sequence[str | Cause] | None) -> dict[str, Cause]:
             raise ValueError(
                 f"`causes` must name causes of the catalogue ({', '.join(known)}) or be causes; got {item!r}."
             )
-    return found
+    return {name: cause for name, cause in found.items() if not cause.is_value}
 
 
 def candidates(
@@ -67,11 +76,8 @@ def candidates(
     found = []
     for cause in selection.values():
         if cause.is_sensor:
-            kind = cause.effect.channel
-            channels = dict.fromkeys(c for n in records for c in n.record.channels if c[0] == kind)
-            if not _has_scale(kind, records):
-                continue
-            spots: list[tuple] = list(channels)
+            kinds = [kind for kind in cause.effect.channels if _has_scale(kind, records)]
+            spots: list[tuple] = list(dict.fromkeys(c for n in records for c in n.record.channels if c[0] in kinds))
         else:
             spots = list(model.links) if places is None else list(places)
         for at in spots:
@@ -134,7 +140,8 @@ def hypothesis(
     for start, begin in zip_longest(starts, begins):
         effect = [p for p in start.entries() if p not in given]
         structure = with_offsets(start, records)
-        mine: list[Unknown] = [own_unknown(structure, p, trust) for p in own]
+        degrees = DEGREES_BESIDE if effect else DEGREES
+        mine: list[Unknown] = [own_unknown(structure, p, trust, degrees) for p in own]
         if begin is not None:
             stated = structure.values()
             mine = [replace(u, theta=math.log(begin[u.path] / stated[u.path])) for u in mine]

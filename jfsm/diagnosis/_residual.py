@@ -112,7 +112,7 @@ def curves(found: Residual, units, term: AbstractTerm | None) -> dict[str, Any]:
             "force": values.tolist(),
             "visited": visited.tolist(),
         }
-    if term is not None:
+    if term is not None and not term.states and term.delay is None:
         zero = jnp.zeros(())
         along_x = [float(term.force(d, zero, (), zero)) for d in jnp.asarray(x)]
         along_v = [float(term.force(zero, w, (), zero)) for w in jnp.asarray(v)]

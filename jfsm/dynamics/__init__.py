@@ -1,6 +1,18 @@
 """What it does: structures lowered to arrays, and their free runs."""
 
 from ._drive import Reconstruction as Reconstruction
+from ._fixed_points import FixedPoint as FixedPoint
+from ._fixed_points import fixed_points as fixed_points
+from ._harmonic_balance import Backbone as Backbone
+from ._harmonic_balance import ForcedResponse as ForcedResponse
+from ._harmonic_balance import backbone as backbone
+from ._harmonic_balance import forced_response as forced_response
+from ._limit_cycles import LimitCycle as LimitCycle
+from ._limit_cycles import limit_cycles as limit_cycles
+from ._linearise import Linearisation as Linearisation
+from ._linearise import linearise as linearise
+from ._many import Responses as Responses
+from ._many import simulate_many as simulate_many
 from ._plant import lower as lower
 from ._simulate import Response as Response
 from ._simulate import simulate as simulate

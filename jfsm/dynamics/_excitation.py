@@ -1,19 +1,27 @@
 """What drives a run, taken from a record."""
 
 import math
+from collections.abc import Mapping
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..records import Record, silent_forces
-from ..structures import Structure
+from ..records import Record, declipped, silent_forces
+from ..structures import Clipping, LinearDamping, LinearStiffness, Structure
 from ._drive import Reconstruction, reconstruct
+from ._forces import hidden_rate, hidden_start
 from ._grid import Fine
-from ._plant import lower
+from ._plant import Plant, lower
+from ._stepper import free_acceleration, inverse_mass
 
 _STEP_ANGLE = 0.22
 """Largest angle of the fastest mode per step [rad]: Runge-Kutta of order four then shifts a frequency by 2e-5."""
 _MOST_SUBSTEPS = 16
+_MOST_STIFF_SUBSTEPS = 64
+_KINKED_SUBSTEPS = 2
+"""Steps per sample at least for hidden states, which yield and slide at instants of their own."""
 _STABLE_ANGLE = 2.6
 """Largest angle per step at which Runge-Kutta of order four does not blow up by itself."""
 
@@ -33,18 +41,20 @@ def fastest_mode(structure: Structure) -> float:
     return float(np.sqrt(np.max(np.abs(eigenvalues))))
 
 
-def substeps_for(structure: Structure, dt: float) -> int:
+def substeps_for(structure: Structure, dt: float, speed: float = 0.0) -> int:
     """Steps per sample, a power of two, that keep the angle per step of the fastest mode or decay small.
+
+    Laws beside the linear ones may be faster, at rest or at about `speed`: bristles, a friction that turns over
+    steeply. For these the steps need only be stable.
 
     Raises
     ------
     ValueError
         If the largest number of steps would still be unstable, which would pass for a motion that runs away.
     """
-    plant = lower(structure)
-    zero, eye = np.zeros((structure.dof, structure.dof)), np.eye(structure.dof)
-    rates = np.linalg.solve(np.asarray(plant.mass), -np.hstack([plant.stiffness, plant.damping]))
-    fastest = float(np.max(np.abs(np.linalg.eigvals(np.vstack([np.hstack([zero, eye]), rates])))))
+    plant, zero = lower(structure), np.zeros(structure.dof)
+    linear = [term for term in structure.terms if isinstance(term, LinearStiffness | LinearDamping)]
+    fastest = _fastest_rate(lower(Structure(structure.mass, linear)), zero)
     if fastest * dt / _MOST_SUBSTEPS > _STABLE_ANGLE:
         raise ValueError(
             f"`model` must move slowly enough for the record's steps of {dt:.6g} s; its fastest mode or decay has "
@@ -52,20 +62,68 @@ def substeps_for(structure: Structure, dt: float) -> int:
             "Leave that spring, dashpot or small mass out of the model, or use a record of a higher rate."
         )
     need = max(1.0, fastest * dt / _STEP_ANGLE)
-    return min(_MOST_SUBSTEPS, 2 ** math.ceil(math.log2(need)))
+    most = _MOST_SUBSTEPS
+    if len(plant.smooth) or len(plant.memory):
+        rates = [_fastest_rate(plant, v) for v in (zero, zero + speed, zero - speed)]
+        need = max(need, _KINKED_SUBSTEPS if len(plant.memory) else 1, max(rates) * dt / _STABLE_ANGLE)
+        most = _MOST_STIFF_SUBSTEPS
+    return min(most, 2 ** math.ceil(math.log2(need)))
 
 
-def measured_force(record: Record, dof: int) -> np.ndarray:
-    """Force samples (n, dof), zero where no force is applied; a channel that is noise only counts as zero."""
+def _fastest_rate(plant: Plant, v: np.ndarray) -> float:
+    """Largest eigenvalue [rad/s] of a plant's motion about x = 0 at velocity `v`; friction that sticks is left out."""
+    dof = plant.dof
+    return float(np.max(np.abs(np.linalg.eigvals(np.asarray(_slope(plant, jnp.zeros(dof), jnp.asarray(v)))))))
+
+
+@eqx.filter_jit
+def _slope(plant: Plant, x, v):
+    dof, minv, zero = plant.dof, inverse_mass(plant), jnp.zeros(())
+
+    def rate(state):
+        x, v, z = state[:dof], state[dof : 2 * dof], state[2 * dof :]
+        a = free_acceleration(plant, minv, x, v, z, jnp.zeros(dof), zero)
+        return jnp.concatenate([v, a, hidden_rate(plant, x, v, z, zero, zero)])
+
+    return jax.jacfwd(rate)(jnp.concatenate([x, v, hidden_start(plant, x, v)]))
+
+
+def typical_speed(record: Record) -> float:
+    """Size of the velocity, from whatever response there is; 0 where there is none."""
+    speeds = []
+    for (kind, _), y in record.responses.items():
+        change = np.std(np.diff(y)) / record.dt
+        spread = np.std(y)
+        if kind == "velocity":
+            speeds.append(spread)
+        elif kind == "displacement":
+            speeds.append(change)
+        elif change > 0:
+            speeds.append(spread**2 / change)
+    return float(max(speeds, default=0.0))
+
+
+def measured_force(record: Record, dof: int, clipped_at: Mapping[tuple[str, int], float] | None = None) -> np.ndarray:
+    """Force samples (n, dof), zero where no force is applied; a channel that is noise only counts as zero.
+
+    Arcs beyond the limits `clipped_at`, by channel, are reconstructed.
+    """
     force = np.zeros((len(record), dof))
     silent = silent_forces(record)
+    limits = clipped_at or {}
     for (kind, j), samples in record.channels.items():
         if kind == "force":
             if j > dof:
                 raise ValueError(f"`record` has a force at degree of freedom {j}; the structure has {dof}.")
             if j not in silent:
-                force[:, j - 1] = samples
+                limit = limits.get((kind, j))
+                force[:, j - 1] = samples if limit is None else declipped(samples, limit)
     return force
+
+
+def force_limits(structure: Structure) -> dict[tuple[str, int], float]:
+    """Limits beyond which the structure says that a force channel shows nothing."""
+    return {s.at: s.value for s in structure.sensors if isinstance(s, Clipping) and s.at[0] == "force"}
 
 
 def excitation(
@@ -79,7 +137,7 @@ def excitation(
 ) -> Fine:
     """Drive of a record on half steps, padded to `length` samples with nothing.
 
-    `force` (n, dof) replaces the record's own samples where they were smoothed beforehand.
+    `force` (n, dof) replaces the record's own samples where they were smoothed or restored beforehand.
     """
     samples = measured_force(record, dof) if force is None else force
     base = np.zeros(len(record)) if record.base_acceleration is None else record.base_acceleration

@@ -1,10 +1,13 @@
 """Free runs on the sample grid, many parameter sets at once."""
 
+from typing import NamedTuple
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ._forces import hidden_start
 from ._plant import Plant
 from ._stepper import Load, Motion, acceleration, advance, inverse_mass, mode_at
 
@@ -29,6 +32,34 @@ class Fine(eqx.Module):
         return (self.force.shape[1] - 1) // 2
 
 
+def punctual(plant: Plant, fine: Fine) -> Fine:
+    """What drives a run with the delay of its force sensor undone: the force of t is what is read at t + tau."""
+    if not plant.force_delay.size:
+        return fine
+    n, halves, dof = fine.force.shape
+    flat = jnp.concatenate([fine.force[:, :-1].reshape(n * (halves - 1), dof), fine.force[-1:, -1]])
+    columns = [_shifted(flat[:, j], plant.force_delay[j] / fine.step * (halves - 1)) for j in range(dof)]
+    shifted = jnp.stack(columns, 1)
+    take = jnp.arange(n)[:, None] * (halves - 1) + jnp.arange(halves)[None, :]
+    return Fine(shifted[take], fine.base, fine.time, fine.step)
+
+
+def _shifted(values: Float[Array, " n"], places: Float[Array, ""]) -> Float[Array, " n"]:
+    """Values so many places further on, by the cubic through four neighbours."""
+    whole = jax.lax.stop_gradient(jnp.floor(places))
+    s = places - whole
+    weights = (
+        -s * (s - 1) * (s - 2) / 6,
+        (s + 1) * (s - 1) * (s - 2) / 2,
+        -(s + 1) * s * (s - 2) / 2,
+        (s + 1) * s * (s - 1) / 6,
+    )
+    index = jnp.arange(values.size) + whole.astype(int)
+    last = values.size - 1
+    near = jnp.stack([values[jnp.clip(index + k, 0, last)] for k in (-1, 0, 1, 2)])
+    return jnp.sum(jnp.stack(weights)[:, None] * near, 0)
+
+
 def true_force(
     plant: Plant, force: Float[Array, "halves dof"], base: Float[Array, " halves"]
 ) -> Float[Array, "halves dof"]:
@@ -38,34 +69,150 @@ def true_force(
     return measured - base[:, None] * inertia[None, :]
 
 
-def advance_sample(plant: Plant, minv, motion: Motion, force, time, step) -> Motion:
-    """Motion one sample later; `force` (2 substeps + 1, dof) is the true force on half steps."""
+class Past(NamedTuple):
+    """Displacement and velocity of the last samples, the latest first, and how many there have been.
+
+    Before the start the motion was the starting value. Empty where nothing answers the past.
+    """
+
+    x: Float[Array, "reach dof"]
+    v: Float[Array, "reach dof"]
+    count: Float[Array, ""]
+
+
+def no_past(plant: Plant, x0: Float[Array, " dof"]) -> Past:
+    """The past of a run that begins at `x0`."""
+    reach = plant.reach if len(plant.delayed) else 0
+    return Past(jnp.broadcast_to(x0[None, :], (reach, plant.dof)), jnp.zeros((reach, plant.dof)), jnp.zeros(()))
+
+
+def remember(past: Past, x: Float[Array, " dof"], v: Float[Array, " dof"]) -> Past:
+    """The past once another sample has gone by."""
+    if not past.x.size:
+        return past
+    return Past(jnp.concatenate([x[None, :], past.x[:-1]]), jnp.concatenate([v[None, :], past.v[:-1]]), past.count + 1)
+
+
+def delayed_force(plant: Plant, minv, motion: Motion, past: Past, g, time, step) -> Float[Array, "halves dof"]:
+    """Forces that answer the past, on the half steps of a sample; `g` (halves, dof) is what drives it.
+
+    The past is read by cubic Hermite interpolation between samples. What lies inside the present sample (a delay
+    shorter than it) is read off the parabola that the motion begins it with.
+    """
+    halves = g.shape[0]
+    x, v = jnp.concatenate([motion.x[None, :], past.x]), jnp.concatenate([motion.v[None, :], past.v])
+    a = acceleration(plant, minv, *motion, g[0], time)[0]
+    ahead = jnp.linspace(0.0, 1.0, halves)
+    slots, total = plant.delayed, jnp.zeros(g.shape)
+    for i in range(len(slots)):
+        lag = slots.choose(i, lambda law: law.delay) / step - ahead
+        u = lag[:, None] - jnp.arange(x.shape[0])[None, :]  # samples from each node, positive towards the past
+        near, r = jnp.abs(u) < 1.0, jnp.abs(u)
+        value = jnp.where(near, (1.0 + 2.0 * r) * (1.0 - r) ** 2, 0.0)
+        slope = jnp.where(near, -u * (1.0 - r) ** 2 * step, 0.0)
+        early = (lag > past.count)[:, None]
+        inside = (lag < 0)[:, None]
+        s = -lag[:, None] * step
+        start = past.x[-1:, :]
+        d_past = jnp.where(early, start, value @ x + slope @ v)
+        d_now = motion.x[None, :] + s * motion.v[None, :] + s**2 / 2 * a[None, :]
+        w_now = motion.v[None, :] + s * a[None, :]
+        moved = jnp.where(inside, d_now, d_past)
+        speed = jnp.where(inside, w_now, jnp.where(early, 0.0, _slopes(u, r, near, step, x, v)))
+        d, w = (jnp.sum(slots.direction[i][None, :] * q, 1) for q in (moved, speed))
+        force = _late_force(plant, i, d, w, time + ahead * step)
+        total = total + force[:, None] * slots.direction[i][None, :]
+    return total
+
+
+def delayed_along(plant: Plant, x, v, time) -> Float[Array, "n dof"]:
+    """Forces that answer the past along a given motion (n, dof), which stood still before it began."""
+    n, step, slots = x.shape[0], time[1] - time[0], plant.delayed
+    total = jnp.zeros(x.shape)
+    for i in range(len(slots)):
+        place = jnp.arange(n) - slots.choose(i, lambda law: law.delay) / step
+        early = (place < 0)[:, None]
+        k = jnp.clip(jnp.floor(place).astype(int), 0, n - 2)
+        s = jnp.clip(place - k, 0.0, 1.0)[:, None]
+        moved = jnp.where(early, x[:1], x[k] + s * (x[k + 1] - x[k]))
+        speed = jnp.where(early, 0.0, v[k] + s * (v[k + 1] - v[k]))
+        d, w = (jnp.sum(slots.direction[i][None, :] * q, 1) for q in (moved, speed))
+        force = _late_force(plant, i, d, w, time)
+        total = total + force[:, None] * slots.direction[i][None, :]
+    return total
+
+
+def _slopes(u, r, near, step, x, v):
+    # Derivative of the Hermite interpolant by time: u falls by one per sample.
+    value = jnp.where(near, 6.0 * u * (1.0 - r) / step, 0.0)
+    slope = jnp.where(near, (1.0 - r) * (1.0 - 3.0 * r), 0.0)
+    return _blend(value, x) + _blend(slope, v)
+
+
+def _late_force(plant: Plant, slot: int, d, w, times):
+    def along(law):
+        return jax.vmap(lambda d, w, t: law.force(d, w, (), t))(d, w, times)
+
+    return plant.delayed.choose(slot, along)
+
+
+def _blend(weights, nodes):
+    return jnp.sum(weights[:, :, None] * nodes[None, :, :], 1)
+
+
+def load_of(plant: Plant, minv, motion: Motion, past: Past, force, base, time, step) -> Float[Array, "halves dof"]:
+    """What drives a sample's motion (2 substeps + 1, dof): the true force, less what answers the past."""
+    g = true_force(plant, force, base)
+    return g - delayed_force(plant, minv, motion, past, g, time, step) if len(plant.delayed) else g
+
+
+def advance_sample(plant: Plant, minv, motion: Motion, force, base, time, step) -> Motion:
+    """Motion one sample later; `force` (2 substeps + 1, dof) is the load on half steps."""
     substeps = (force.shape[0] - 1) // 2
     h = step / substeps
-    if substeps <= _UNROLLED and not len(plant.friction):
+    if substeps <= _UNROLLED and not (len(plant.friction) or plant.hidden):
         for i in range(substeps):
-            motion = advance(plant, minv, motion, Load(force[2 * i : 2 * i + 3], time + i * h, h))
+            nodes = slice(2 * i, 2 * i + 3)
+            motion = advance(plant, minv, motion, Load(force[nodes], base[nodes], time + i * h, h))
         return motion
-    triples = jnp.stack([force[:-2:2], force[1:-1:2], force[2::2]], 1)
+    forces, bases = (
+        jnp.stack([force[:-2:2], force[1:-1:2], force[2::2]], 1),
+        jnp.stack([base[:-2:2], base[1:-1:2], base[2::2]], 1),
+    )
 
     def body(motion, inputs):
-        triple, i = inputs
-        return advance(plant, minv, motion, Load(triple, time + i * h, h)), None
+        triple, bases, i = inputs
+        return advance(plant, minv, motion, Load(triple, bases, time + i * h, h)), None
 
-    return jax.lax.scan(body, motion, (triples, jnp.arange(substeps)))[0]
+    return jax.lax.scan(body, motion, (forces, bases, jnp.arange(substeps)))[0]
+
+
+def begin(plant: Plant, minv, x0, v0, fine: Fine) -> tuple[Motion, Past]:
+    """Motion and past at the first sample; hidden states are relaxed."""
+    z0, past = hidden_start(plant, x0, v0), no_past(plant, x0)
+    resting = Motion(x0, v0, z0, jnp.zeros(len(plant.friction)))
+    g = load_of(plant, minv, resting, past, fine.force[0], fine.base[0], fine.time[0], fine.step)[0]
+    return Motion(x0, v0, z0, mode_at(plant, minv, x0, v0, z0, g, fine.time[0])), past
 
 
 @eqx.filter_jit
 def run_grid(plant: Plant, fine: Fine, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
     """Displacement, velocity and acceleration (relative to the base) at every sample, each (n, dof)."""
+    return free_run(plant, fine, x0, v0)
+
+
+def free_run(plant: Plant, fine: Fine, x0, v0):
+    """As `run_grid`, to be traced."""
     minv = inverse_mass(plant)
+    fine = punctual(plant, fine)
 
-    def body(motion, inputs):
+    def body(carry, inputs):
+        motion, past = carry
         force, base, time = inputs
-        g = true_force(plant, force, base)
-        a = acceleration(plant, minv, motion.x, motion.v, motion.mode, g[0], time)[0]
-        return advance_sample(plant, minv, motion, g, time, fine.step), (motion.x, motion.v, a)
+        g = load_of(plant, minv, motion, past, force, base, time, fine.step)
+        a = acceleration(plant, minv, *motion, g[0], time)[0]
+        after = advance_sample(plant, minv, motion, g, base, time, fine.step)
+        return (after, remember(past, motion.x, motion.v)), (motion.x, motion.v, a)
 
-    first = true_force(plant, fine.force[0], fine.base[0])[0]
-    start = Motion(x0, v0, mode_at(plant, minv, x0, v0, first, fine.time[0]))
+    start = begin(plant, minv, x0, v0, fine)
     return jax.lax.scan(body, start, (fine.force, fine.base, fine.time))[1]

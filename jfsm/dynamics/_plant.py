@@ -4,8 +4,9 @@ A program is keyed by the number of degrees of freedom, of slots and of channels
 which law of the table stands in a slot, by its place, sign or values: those are data.
 """
 
-from collections.abc import Sequence
-from typing import Any
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -14,20 +15,50 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..structures import (
+    DELAYED_TERMS,
     FRICTION_TERMS,
+    MEMORY_TERMS,
     SMOOTH_TERMS,
     AbstractFriction,
+    AccelerationBias,
+    ChannelDelay,
+    Clipping,
+    ForceDelay,
     LinearDamping,
     LinearStiffness,
     MapTerm,
     Offset,
+    StiffnessDrop,
     Structure,
 )
 
 Channel = tuple[str, int]
 
-LAW_PARAMETERS = 4
+LAW_PARAMETERS = 5
 """Width of a slot's row of numbers; laws with fewer leave the rest at zero."""
+HIDDEN_STATES = 2
+"""Width of a slot's row of hidden states; laws with fewer leave the rest at zero."""
+
+
+_REACH = 64
+"""Samples that a delay may reach back, at least."""
+
+
+class Grid(NamedTuple):
+    """Sample interval [s] and steps per sample of a fixed scheme."""
+
+    dt: float
+    substeps: int
+
+    @property
+    def ramp(self) -> float:
+        """Time [s] over which a jump at an instant is spread: two steps, so that the scheme sees where it falls."""
+        return 2 * self.dt / self.substeps
+
+    def reach(self, delayed: Sequence[Any]) -> int:
+        """Samples that the past must reach back for these terms, a power of two."""
+        longest = max((float(term.delay) for term in delayed), default=0.0)
+        return max(_REACH, 2 ** math.ceil(math.log2(longest / self.dt + 3)))
 
 
 class Slots(eqx.Module):
@@ -44,9 +75,21 @@ class Slots(eqx.Module):
     def __len__(self) -> int:
         return self.kind.shape[0]
 
-    def term(self, law: type, slot: int, parameters: Float[Array, " width"]) -> Any:
+    def term(self, law: type, parameters: Float[Array, " width"]) -> Any:
         """The term of this class that a row of numbers means."""
-        return law(*(parameters[i] for i in range(len(law.parameters))), at=(0, 1))
+        count = len(law.parameters) + (law is StiffnessDrop)
+        return law(*(parameters[i] for i in range(count)), at=(0, 1))
+
+    def choose(self, slot: int, ask: Callable[[Any], Any]) -> Any:
+        """What `ask` makes of the term that stands in a slot."""
+        branches = [lambda p, law=law: ask(self.term(law, p)) for law in self.laws]
+        if len(branches) == 1:
+            return branches[0](self.parameters[slot])
+        return jax.lax.switch(self.kind[slot], branches, self.parameters[slot])
+
+    def motion(self, slot: int, x: Float[Array, " dof"], v: Float[Array, " dof"]) -> tuple[Any, Any]:
+        """Relative displacement and velocity of a slot's link."""
+        return jnp.sum(self.direction[slot] * x), jnp.sum(self.direction[slot] * v)
 
 
 class MapSlot(eqx.Module):
@@ -57,22 +100,36 @@ class MapSlot(eqx.Module):
 
 
 class Plant(eqx.Module):
-    """Arrays of a structure and of its sensors, for one list of response channels."""
+    """Arrays of a structure and of its sensors, for one list of response channels.
+
+    `force_delay` and `channel_delay` are empty where nothing is late: being late has programs of its own. Delayed
+    forces reach back at most `reach` samples.
+    """
 
     mass: Float[Array, "dof dof"]
     damping: Float[Array, "dof dof"]
     stiffness: Float[Array, "dof dof"]
     smooth: Slots
     friction: Slots
+    memory: Slots
+    delayed: Slots
     maps: tuple[MapSlot, ...]
     force_gain: Float[Array, " dof"]
     force_offset: Float[Array, " dof"]
     channel_gain: Float[Array, " channels"]
     channel_offset: Float[Array, " channels"]
+    force_delay: Float[Array, " dof_or_none"]
+    channel_delay: Float[Array, " channels_or_none"]
+    reach: int = eqx.field(static=True)
 
     @property
     def dof(self) -> int:
         return self.mass.shape[0]
+
+    @property
+    def hidden(self) -> int:
+        """Number of hidden states."""
+        return len(self.memory) * hidden_width(self.memory)
 
 
 class Readout(eqx.Module):
@@ -99,8 +156,13 @@ def direction(at: tuple[int, int], dof: int) -> np.ndarray:
     return row
 
 
+def hidden_width(memory: Slots) -> int:
+    """Hidden states per slot."""
+    return max(HIDDEN_STATES, *(law.states for law in memory.laws))
+
+
 def lower(
-    structure: Structure, channels: Sequence[Channel] = (), *, smooth_slots: int = 0, friction_slots: int = 0
+    structure: Structure, channels: Sequence[Channel] = (), *, smooth_slots: int = 0, grid: Grid | None = None
 ) -> Plant:
     """Plant of a structure.
 
@@ -109,80 +171,65 @@ def lower(
     structure : Structure
     channels : sequence of (kind, degree of freedom)
         Response channels, in the order of the record.
-    smooth_slots, friction_slots : int
-        Least number of slots; more are made where the structure needs them.
+    smooth_slots : int
+        Least number of slots for smooth laws; more are made where the structure needs them.
+    grid : Grid, optional
+        Steps of the scheme that the plant is for; None for one that finds its own.
     """
     dof = structure.dof
     mass = np.asarray(structure.mass)
     matrices = {LinearStiffness: np.zeros((dof, dof)), LinearDamping: np.zeros((dof, dof))}
-    smooth, friction, maps = [], [], []
+    smooth, friction, memory, delayed, maps = [], [], [], [], []
     for term in structure.terms:
         row = direction(term.at, dof)
         if isinstance(term, LinearStiffness | LinearDamping):
             matrices[type(term)] += float(term.values[0]) * np.outer(row, row)
         elif isinstance(term, MapTerm):
             maps.append(MapSlot(term.force_map, jnp.asarray(row)))
+        elif isinstance(term, AbstractFriction):
+            friction.append(term)
         else:
-            (friction if isinstance(term, AbstractFriction) else smooth).append(term)
-    force_gain, force_offset = np.zeros(dof), np.zeros(dof)
-    channel_gain, channel_offset = np.zeros(len(channels)), np.zeros(len(channels))
+            (memory if term.states else smooth if term.delay is None else delayed).append(term)
+    force_gain, force_offset, force_delay = np.zeros(dof), np.zeros(dof), np.zeros(dof)
+    channel_gain, channel_offset, channel_delay = (np.zeros(len(channels)) for _ in range(3))
     for sensor in structure.sensors:
-        offset = isinstance(sensor, Offset)
-        if sensor.at[0] == "force":
-            (force_offset if offset else force_gain)[sensor.at[1] - 1] += sensor.value
-        elif sensor.at in channels:
-            (channel_offset if offset else channel_gain)[list(channels).index(sensor.at)] += sensor.value
+        if isinstance(sensor, Clipping):
+            continue  # concerns readings, not what is behind them
+        row, place = (force_gain, force_offset, force_delay), sensor.at[1] - 1
+        if sensor.at[0] != "force":
+            if sensor.at not in channels:
+                continue
+            row, place = (channel_gain, channel_offset, channel_delay), list(channels).index(sensor.at)
+        late, shifted = isinstance(sensor, ForceDelay | ChannelDelay), isinstance(sensor, Offset | AccelerationBias)
+        row[2 if late else 1 if shifted else 0][place] += sensor.value
+    kinds = {type(sensor) for sensor in structure.sensors}
     return Plant(
         mass=jnp.asarray(np.diag(mass) if mass.ndim == 1 else mass),
         damping=jnp.asarray(matrices[LinearDamping]),
         stiffness=jnp.asarray(matrices[LinearStiffness]),
-        smooth=_slots(smooth, SMOOTH_TERMS, max(smooth_slots, len(smooth)), dof),
-        friction=_slots(friction, FRICTION_TERMS, max(friction_slots, len(friction)), dof),
+        smooth=_slots(smooth, SMOOTH_TERMS, max(smooth_slots, len(smooth)), dof, 0.0 if grid is None else grid.ramp),
+        friction=_slots(friction, FRICTION_TERMS, len(friction), dof),
+        memory=_slots(memory, MEMORY_TERMS, len(memory), dof),
+        delayed=_slots(delayed, DELAYED_TERMS, len(delayed), dof),
         maps=tuple(maps),
         force_gain=jnp.asarray(force_gain),
         force_offset=jnp.asarray(force_offset),
         channel_gain=jnp.asarray(channel_gain),
         channel_offset=jnp.asarray(channel_offset),
+        force_delay=jnp.asarray(force_delay if ForceDelay in kinds else np.zeros(0)),
+        channel_delay=jnp.asarray(channel_delay if ChannelDelay in kinds else np.zeros(0)),
+        reach=_REACH if grid is None else grid.reach(delayed),
     )
 
 
-def _slots(terms: list, laws: tuple[type, ...], count: int, dof: int) -> Slots:
+def _slots(terms: list, laws: tuple[type, ...], count: int, dof: int, ramp: float = 0.0) -> Slots:
     laws = laws + tuple(dict.fromkeys(type(term) for term in terms if type(term) not in laws))
-    kind, parameters, directions = np.zeros(count, np.int32), np.zeros((count, LAW_PARAMETERS)), np.zeros((count, dof))
+    widest = max([LAW_PARAMETERS, *(len(term.values) for term in terms)])
+    kind, parameters, directions = np.zeros(count, np.int32), np.zeros((count, widest)), np.zeros((count, dof))
     for i, term in enumerate(terms):
         kind[i] = laws.index(type(term))
         parameters[i, : len(term.values)] = [float(value) for value in term.values]
+        if isinstance(term, StiffnessDrop):
+            parameters[i, len(term.values)] = ramp
         directions[i] = direction(term.at, dof)
     return Slots(jnp.asarray(kind), jnp.asarray(parameters), jnp.asarray(directions), laws)
-
-
-def smooth_force(
-    plant: Plant, x: Float[Array, " dof"], v: Float[Array, " dof"], t: Float[Array, ""]
-) -> Float[Array, " dof"]:
-    """Everything on the left-hand side but inertia and friction."""
-    total = jnp.sum(plant.stiffness * x[None, :], 1) + jnp.sum(plant.damping * v[None, :], 1)
-    slots = plant.smooth
-    for i in range(len(slots)):
-        row = slots.direction[i]
-        branches = [lambda p, d, w, t, law=law, i=i: slots.term(law, i, p).force(d, w, (), t) for law in slots.laws]
-        d, w = jnp.sum(row * x), jnp.sum(row * v)
-        total = total + row * jax.lax.switch(slots.kind[i], branches, slots.parameters[i], d, w, t)
-    for slot in plant.maps:
-        row = slot.direction
-        total = total + row * slot.force_map(jnp.stack([jnp.sum(row * x), jnp.sum(row * v)]))
-    return total
-
-
-def friction_limits(
-    plant: Plant, x: Float[Array, " dof"], v: Float[Array, " dof"], t: Float[Array, ""]
-) -> tuple[Float[Array, " slots"], Float[Array, " slots"]]:
-    """Sliding force backward and forward of every friction slot; their bounds while sticking."""
-    slots = plant.friction
-    lower_limits, upper_limits = [], []
-    for i in range(len(slots)):
-        d, w = jnp.sum(slots.direction[i] * x), jnp.sum(slots.direction[i] * v)
-        branches = [lambda p, d, w, t, law=law, i=i: slots.term(law, i, p).limits(d, w, (), t) for law in slots.laws]
-        low, high = jax.lax.switch(slots.kind[i], branches, slots.parameters[i], d, w, t)
-        lower_limits.append(low)
-        upper_limits.append(high)
-    return jnp.stack(lower_limits), jnp.stack(upper_limits)

@@ -1,6 +1,6 @@
 """Free runs of a structure, driven by what a record says drove it."""
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -8,22 +8,32 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from .._result import Result
 from .._types import require_x64
 from ..records import Record
-from ..structures import AbstractSensor, AccelerationGain, MapTerm, Offset, Structure
+from ..structures import (
+    AbstractSensor,
+    AccelerationBias,
+    AccelerationGain,
+    ChannelDelay,
+    Clipping,
+    MapTerm,
+    Offset,
+    Structure,
+)
 from ..surrogates import AbstractForceStateMap, tabulate
 from ._drive import Reconstruction
-from ._excitation import bucket, excitation, substeps_for
-from ._grid import run_grid, true_force
-from ._plant import Plant, lower
+from ._excitation import bucket, excitation, force_limits, measured_force, substeps_for, typical_speed
+from ._grid import punctual, run_grid, true_force
+from ._plant import Grid, Plant, lower
 from ._reference import run_reference
 from ._start import starting_state
 from ._stepper import free_acceleration, inverse_mass
 
-_FRICTION_SUBSTEPS = 4
-"""Steps per sample at least where something sticks; the error falls with the fourth power."""
+_FIXED_SUBSTEPS = 4
+"""Steps per sample at least where something sticks or answers the past; the error falls with the fourth power."""
 _BOUND = 1e6
 """A motion this many times larger than anything that was measured or could be driven has escaped."""
 
@@ -42,7 +52,9 @@ class Response:
     result : Result
         How the run ended.
     escape_time : float or None
-        Instant [s] at which the motion left every bound.
+        Instant [s] at which the motion left every bound; the state there is the last of the arrays.
+    solver : str
+        ``"reference"`` or ``"grid"``, whichever the motion comes from.
     """
 
     time: np.ndarray
@@ -51,16 +63,24 @@ class Response:
     acceleration: np.ndarray
     result: Result
     escape_time: float | None
-    _gains: Mapping[tuple[str, int], float]
-    _offsets: Mapping[tuple[str, int], float]
+    solver: str
+    _sensors: tuple[AbstractSensor, ...]
 
     def readings(self, record: Record) -> dict[tuple[str, int], np.ndarray]:
-        """What the sensors of `record` would show, by channel (kind, degree of freedom): gains applied."""
+        """What the sensors of `record` would show, by channel (kind, degree of freedom): their effects applied."""
         found = {}
         for key in record.responses:
-            offset = self._offsets.get(key, 0.0)  # a gain acts on the motion, the offset comes after it
-            motion = getattr(self, key[0])[:, key[1] - 1] - offset
-            found[key] = (1.0 + self._gains.get(key, 0.0)) * motion + offset
+            offset = total(self._sensors, Offset, key)
+            y = (
+                getattr(self, key[0])[:, key[1] - 1] - offset
+            )  # gain and delay act on the motion, the offset comes after
+            late = total(self._sensors, ChannelDelay, key)
+            if late and y.size > 3:
+                y = CubicSpline(self.time, y)(np.clip(self.time - late, self.time[0], self.time[-1]))
+            bias = total(self._sensors, AccelerationBias, key)
+            y = (1.0 + total(self._sensors, AccelerationGain, key)) * y + offset + bias
+            limits = [s.value for s in self._sensors if isinstance(s, Clipping) and s.at == key]
+            found[key] = np.clip(y, -min(limits), min(limits)) if limits else y
         return found
 
 
@@ -106,48 +126,46 @@ def simulate(
     require_x64()
     check_pair(model, record)
     model = with_tables(model)
-    friction = bool(len(lower(model).friction))
-    substeps = substeps_for(model, record.dt)
-    substeps = max(substeps, _FRICTION_SUBSTEPS) if friction else 2 * substeps
     channels = tuple(record.responses)
-    plant = lower(model, channels)
-    fine = excitation(record, model.dof, substeps, reconstruction, length=bucket(len(record)))
+    exact = lower(model, channels)
+    fixed = bool(len(exact.friction) or len(exact.delayed))  # what sticks or answers the past has a scheme of its own
+    substeps = substeps_for(model, record.dt, typical_speed(record))
+    substeps = max(substeps, _FIXED_SUBSTEPS) if fixed else 2 * substeps
+    plant = lower(model, channels, grid=Grid(record.dt, substeps))
+    force = measured_force(record, model.dof, force_limits(model))
+    fine = excitation(record, model.dof, substeps, reconstruction, length=bucket(len(record)), force=force)
     x0, v0 = starting_state(model, record, initial_state, window=window, reconstruction=reconstruction)
     # The grid run is cheap, and tells where an unstable motion leaves, before any step control meets it.
-    x, v, a = (np.asarray(q)[: len(record)] for q in run_grid(plant, fine, jnp.asarray(x0), jnp.asarray(v0)))
-    stop = _escape(plant, fine, x, v, record, x0, v0)
-    if stop is None and solver == "reference" and not friction:
+    start = jnp.asarray(x0), jnp.asarray(v0)
+    x, v, a = (np.asarray(q)[: len(record)] for q in run_grid(plant, fine, *start))
+    stop, used = _escape(plant, fine, x, v, record, x0), "grid"
+    if stop is None and solver == "reference" and not fixed:
         scale = jnp.maximum(jnp.std(jnp.asarray(x)), 1e-30)
-        start, within = (jnp.asarray(x0), jnp.asarray(v0)), jnp.asarray(tolerance, dtype=jnp.float64)
-        xr, vr, done = run_reference(plant, fine, *start, within, scale)
-        if bool(done):
-            x, v = np.asarray(xr)[: len(record)], np.asarray(vr)[: len(record)]
-            a = _accelerations(plant, fine, x, v)
+        run = run_reference(exact, fine, *start, jnp.asarray(tolerance, dtype=jnp.float64), scale)
+        if bool(run[-1]):
+            used = "reference"
+            a = np.asarray(_accelerations(exact, fine, *run[:-1]))[: len(record)]
+            x, v = (np.asarray(q)[: len(record)] for q in run[:2])
     n = len(record) if stop is None else stop
     if record.base_acceleration is not None:
         a = a + record.base_acceleration[:, None]
-    offsets, gains = _totals(model, Offset), _totals(model, AccelerationGain)
     shown = {}
     for kind, values in (("displacement", x), ("velocity", v), ("acceleration", a)):
-        shift = np.array([offsets.get((kind, j + 1), 0.0) for j in range(model.dof)])
+        shift = np.array([total(model.sensors, Offset, (kind, j + 1)) for j in range(model.dof)])
         shown[kind] = values[:n] + shift
     return Response(
         time=record.time[:n],
         result=Result.successful if stop is None else Result.diverged,
         escape_time=None if stop is None else float(record.time[stop]),
-        _gains=gains,
-        _offsets=offsets,
+        solver=used,
+        _sensors=model.sensors,
         **shown,
     )
 
 
-def _totals(model: Structure, effect: type[AbstractSensor]) -> dict[tuple[str, int], float]:
-    """Sum of the effects of one kind on each channel."""
-    found: dict[tuple[str, int], float] = {}
-    for sensor in model.sensors:
-        if isinstance(sensor, effect):
-            found[sensor.at] = found.get(sensor.at, 0.0) + float(getattr(sensor, effect.parameters[0].name))
-    return found
+def total(sensors: Sequence[AbstractSensor], effect: type[AbstractSensor], channel: tuple[str, int]) -> float:
+    """Sum of the effects of one kind on a channel."""
+    return sum(s.value for s in sensors if isinstance(s, effect) and s.at == channel)
 
 
 def with_tables(model: Structure) -> Structure:
@@ -181,28 +199,29 @@ def check_pair(model: Structure, record: Record) -> None:
 
 
 @eqx.filter_jit
-def _accelerations_program(plant, fine, x, v):
-    minv = inverse_mass(plant)
+def _accelerations(plant: Plant, fine, x, v, z):
+    """Accelerations (n, dof) along a motion."""
+    minv, fine = inverse_mass(plant), punctual(plant, fine)
 
-    def one(force, base, time, x, v):
-        return free_acceleration(plant, minv, x, v, true_force(plant, force[:1], base[:1])[0], time)
+    def one(force, base, time, x, v, z):
+        return free_acceleration(plant, minv, x, v, z, true_force(plant, force[:1], base[:1])[0], time)
 
-    return jax.vmap(one)(fine.force, fine.base, fine.time, x, v)
-
-
-def _accelerations(plant: Plant, fine, x: np.ndarray, v: np.ndarray) -> np.ndarray:
-    pad = ((0, fine.time.shape[0] - x.shape[0]), (0, 0))
-    return np.asarray(_accelerations_program(plant, fine, np.pad(x, pad), np.pad(v, pad)))[: x.shape[0]]
+    return jax.vmap(one)(fine.force, fine.base, fine.time, x, v, z)
 
 
-def _escape(plant: Plant, fine, x, v, record: Record, x0, v0) -> int | None:
-    """First sample beyond every bound, if any."""
+def motion_bound(plant: Plant, fine, record: Record, x0, x) -> float:
+    """Displacement beyond which a run has escaped: far more than was measured, could be driven, or is usual in it."""
     measured = [np.max(np.abs(y)) for (kind, _), y in record.responses.items() if kind == "displacement"]
     stiffness, mass = float(jnp.max(jnp.abs(plant.stiffness))), float(jnp.max(jnp.abs(plant.mass)))
     driving = float(jnp.max(jnp.abs(fine.force))) + mass * float(jnp.max(jnp.abs(fine.base)))
     static = driving / stiffness if stiffness > 0 else driving * record.duration**2 / mass
     # With nothing else to compare with, the median of the run has to do.
     own = float(np.nanmedian(np.abs(np.where(np.isfinite(x), x, np.nan)))) if np.any(np.isfinite(x)) else 0.0
-    bound = _BOUND * max([*measured, static, float(np.max(np.abs(x0))), own, 1e-300])
+    return _BOUND * max([*measured, static, float(np.max(np.abs(x0))), own, 1e-300])
+
+
+def _escape(plant: Plant, fine, x, v, record: Record, x0) -> int | None:
+    """First sample beyond every bound, if any."""
+    bound = motion_bound(plant, fine, record, x0, x)
     bad = ~np.all(np.isfinite(x) & np.isfinite(v) & (np.abs(x) < bound), axis=1)
     return int(np.argmax(bad)) if np.any(bad) else None

@@ -12,9 +12,9 @@ from .._types import as_array
 from ..records import Record
 from ..structures import Structure
 from ._drive import Reconstruction
-from ._excitation import bucket, excitation, substeps_for
-from ._grid import run_grid
-from ._plant import lower, readout
+from ._excitation import bucket, excitation, substeps_for, typical_speed
+from ._grid import free_run
+from ._plant import Grid, lower, readout
 
 _ITERATIONS = 12
 
@@ -60,9 +60,10 @@ def _least_squares(model: Structure, head: Record, reconstruction: Reconstructio
     y = np.column_stack([head.responses[c] for c in channels])
     spread = np.maximum(np.std(y, axis=0), 1e-12 * np.max(np.abs(y)) + 1e-300)
     padded = bucket(len(head))
-    fine = excitation(head, model.dof, substeps_for(model, head.dt), reconstruction, length=padded)
+    substeps = substeps_for(model, head.dt, typical_speed(head))
+    fine = excitation(head, model.dof, substeps, reconstruction, length=padded)
     counted = jnp.asarray(np.arange(padded) < len(head), dtype=jnp.float64)
-    plant, show = lower(model, channels), readout(channels, model.dof)
+    plant, show = lower(model, channels, grid=Grid(head.dt, substeps)), readout(channels, model.dof)
     offset = y - np.asarray(plant.channel_offset)
     state = np.zeros(2 * model.dof)
     for i, (kind, j) in enumerate(channels):  # a measured channel is its own best first guess
@@ -96,7 +97,7 @@ def _residuals(plant, show, fine, y, spread, counted, state):
     dof = plant.dof
 
     def residual(state):
-        x, v, a = run_grid.__wrapped__(plant, fine, state[:dof], state[dof:])
+        x, v, a = free_run(plant, fine, state[:dof], state[dof:])
         shown = {"displacement": x, "velocity": v, "acceleration": a + fine.base[:, :1]}
         seen = jnp.stack([shown[kind] @ row for kind, row in zip(show.kinds, show.select, strict=True)], 1)
         shown_by_sensors = (1 + plant.channel_gain)[None, :] * seen + plant.channel_offset[None, :]

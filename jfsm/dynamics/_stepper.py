@@ -3,7 +3,8 @@
 While every link either slides one way or sticks, the motion is smooth. So a step freezes that *mode* (+1, -1, or 0 for
 sticking), looks for the first instant at which a mode ends (a sliding speed passes zero, or the force that holds a
 sticking link passes its limit), steps to that instant, decides the next mode from the force needed to stick, and goes
-on. The number of such segments in a step is fixed, so that many runs go side by side.
+on. The number of such segments in a step is fixed, so that many runs go side by side. Hidden states take part in the
+Runge-Kutta steps, and are put back within their bounds at the end of each.
 """
 
 from typing import NamedTuple
@@ -12,7 +13,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ._plant import Plant, friction_limits, smooth_force
+from ._forces import friction_limits, hidden_rate, settle, smooth_force
+from ._plant import Plant
 
 _SEGMENTS = 3
 """Modes that one step may pass through: slide, stick, slide."""
@@ -21,17 +23,19 @@ _SHARED = 1e-10
 
 
 class Motion(NamedTuple):
-    """State of a run: displacement, velocity, and mode of each friction slot."""
+    """State of a run: displacement, velocity, hidden states, and mode of each friction slot."""
 
     x: Float[Array, " dof"]
     v: Float[Array, " dof"]
+    z: Float[Array, " hidden"]
     mode: Float[Array, " slots"]
 
 
 class Load(NamedTuple):
-    """Forces at the start, the middle and the end of a step, its start time and its length."""
+    """Forces at the start, the middle and the end of a step, the base's acceleration, its start time and its length."""
 
     force: Float[Array, "3 dof"]
+    base: Float[Array, " 3"]
     time: Float[Array, ""]
     step: Float[Array, ""]
 
@@ -51,9 +55,9 @@ def _times(matrix, vector):
     return jnp.sum(matrix * vector[None, :], 1)
 
 
-def free_acceleration(plant: Plant, minv, x, v, g, t):
+def free_acceleration(plant: Plant, minv, x, v, z, g, t):
     """Acceleration without friction."""
-    return _times(minv, g - smooth_force(plant, x, v, t))
+    return _times(minv, g - smooth_force(plant, x, v, z, t))
 
 
 def holding_force(plant: Plant, minv, a, sticking):
@@ -70,9 +74,9 @@ def holding_force(plant: Plant, minv, a, sticking):
     return jnp.linalg.solve(matrix, jnp.where(sticking, need, 0.0))
 
 
-def acceleration(plant: Plant, minv, x, v, mode, g, t):
+def acceleration(plant: Plant, minv, x, v, z, mode, g, t):
     """Acceleration in the given mode, and the margin of each friction slot: negative once its mode has ended."""
-    a = free_acceleration(plant, minv, x, v, g, t)
+    a = free_acceleration(plant, minv, x, v, z, g, t)
     if not len(plant.friction):
         return a, mode
     low, high = friction_limits(plant, x, v, t)
@@ -85,73 +89,77 @@ def acceleration(plant: Plant, minv, x, v, mode, g, t):
     return a, margin
 
 
-def mode_at(plant: Plant, minv, x, v, g, t):
+def mode_at(plant: Plant, minv, x, v, z, g, t):
     """Mode of each friction slot in a state: the sign of its speed; at rest, whether it sticks or which way it goes."""
     if not len(plant.friction):
         return jnp.zeros(0)
     speed = jnp.sum(plant.friction.direction * v[None, :], 1)
-    return _from_rest(plant, minv, x, v, g, t, jnp.sign(speed), jnp.zeros(speed.shape, bool))
+    return _from_rest(plant, minv, x, v, z, g, t, jnp.sign(speed), jnp.zeros(speed.shape, bool))
 
 
-def _from_rest(plant: Plant, minv, x, v, g, t, mode, broken):
+def _from_rest(plant: Plant, minv, x, v, z, g, t, mode, broken):
     # Force needed to hold the links at rest while the others slide; beyond a limit a link breaks away. One that is
     # known to have broken goes whichever way it is pulled: at the instant itself rounding decides about the limit.
     rows, rest = plant.friction.direction, mode == 0
     low, high = friction_limits(plant, x, v, t)
     sliding = jnp.where(mode > 0, high, jnp.where(mode < 0, low, 0.0))
-    a = free_acceleration(plant, minv, x, v, g, t) - _times(minv, jnp.sum(rows * sliding[:, None], 0))
+    a = free_acceleration(plant, minv, x, v, z, g, t) - _times(minv, jnp.sum(rows * sliding[:, None], 0))
     held = holding_force(plant, minv, a, rest)
     low, high = jnp.where(broken, (low + high) / 2, low), jnp.where(broken, (low + high) / 2, high)
     return jnp.where(rest, jnp.where(held > high, 1.0, jnp.where(held < low, -1.0, 0.0)), mode)
 
 
-def _runge_kutta(plant: Plant, minv, x, v, mode, load: Load, start, share):
+def _runge_kutta(plant: Plant, minv, x, v, z, mode, load: Load, start, share):
     """State after `share` of the step from `start` (both shares of the whole step), in a frozen mode."""
     h = share * load.step
     t = load.time + start * load.step
     g0, g1, g2 = (load.at(start), load.at(start + share / 2), load.at(start + share))
 
-    def slope(x, v, g, t):
-        return v, acceleration(plant, minv, x, v, mode, g, t)[0]
+    def slope(x, v, z, g, base, t):
+        return v, acceleration(plant, minv, x, v, z, mode, g, t)[0], hidden_rate(plant, x, v, z, t, base)
 
-    v1, a1 = slope(x, v, g0, t)
-    v2, a2 = slope(x + h / 2 * v1, v + h / 2 * a1, g1, t + h / 2)
-    v3, a3 = slope(x + h / 2 * v2, v + h / 2 * a2, g1, t + h / 2)
-    v4, a4 = slope(x + h * v3, v + h * a3, g2, t + h)
-    return x + h / 6 * (v1 + 2 * v2 + 2 * v3 + v4), v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+    # The base's inertia is part of the force; what hidden masses feel of it is taken at the three nodes.
+    b0, b1, b2 = load.base[0], load.base[1], load.base[2]
+    v1, a1, r1 = slope(x, v, z, g0, b0, t)
+    v2, a2, r2 = slope(x + h / 2 * v1, v + h / 2 * a1, z + h / 2 * r1, g1, b1, t + h / 2)
+    v3, a3, r3 = slope(x + h / 2 * v2, v + h / 2 * a2, z + h / 2 * r2, g1, b1, t + h / 2)
+    v4, a4, r4 = slope(x + h * v3, v + h * a3, z + h * r3, g2, b2, t + h)
+    x = x + h / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
+    v = v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+    return x, v, settle(plant, x, z + h / 6 * (r1 + 2 * r2 + 2 * r3 + r4))
 
 
 def advance(plant: Plant, minv, motion: Motion, load: Load) -> Motion:
     """Motion at the end of one step."""
-    x, v, mode = motion
-    zero = jnp.zeros(())
+    x, v, z, mode = motion
+    zero, one = jnp.zeros(()), jnp.ones(())
     if not len(plant.friction):
-        return Motion(*_runge_kutta(plant, minv, x, v, mode, load, zero, jnp.ones(())), mode)
+        return Motion(*_runge_kutta(plant, minv, x, v, z, mode, load, zero, one), mode)
 
     def segment(carry, last):
-        x, v, mode, start = carry
+        x, v, z, mode, start = carry
         left = 1.0 - start
-        xe, ve = _runge_kutta(plant, minv, x, v, mode, load, start, left)
-        ended = (acceleration(plant, minv, xe, ve, mode, load.at(jnp.ones(())), load.time + load.step)[1] < 0) & ~last
-        path = _path(plant, minv, (x, v), (xe, ve), mode, load, start, left)
+        xe, ve, ze = _runge_kutta(plant, minv, x, v, z, mode, load, start, left)
+        ended = (acceleration(plant, minv, xe, ve, ze, mode, load.at(one), load.time + load.step)[1] < 0) & ~last
+        path = _path(plant, minv, (x, v, z), (xe, ve, ze), mode, load, start, left)
         shares = jnp.where(ended, _event(plant, minv, path, mode, load, start, left), 1.0)
         share = jnp.min(shares)
         any_event = jnp.any(ended)
-        xs, vs = path(share)
+        xs, vs, zs = path(share)
         now = start + left * share
         switching = ended & (shares == share)
         rows = plant.friction.direction
         vs = vs - _remove(minv, rows, jnp.sum(rows * vs[None, :], 1), switching & (mode != 0))
         resting = jnp.where(switching, 0.0, mode)
         broken = switching & (mode == 0)
-        decided = _from_rest(plant, minv, xs, vs, load.at(now), load.time + now * load.step, resting, broken)
-        x, v = jnp.where(any_event, xs, xe), jnp.where(any_event, vs, ve)
-        return (x, v, jnp.where(switching, decided, mode), jnp.where(any_event, now, 1.0)), None
+        decided = _from_rest(plant, minv, xs, vs, zs, load.at(now), load.time + now * load.step, resting, broken)
+        x, v, z = (jnp.where(any_event, at, end) for at, end in ((xs, xe), (vs, ve), (zs, ze)))
+        return (x, v, z, jnp.where(switching, decided, mode), jnp.where(any_event, now, 1.0)), None
 
     # The last segment goes to the end whatever happens; a step is short beside the time between reversals.
     last = jnp.arange(_SEGMENTS) == _SEGMENTS - 1
-    (x, v, mode, _), _ = jax.lax.scan(segment, (x, v, mode, zero), last)
-    return Motion(x, v, mode)
+    (x, v, z, mode, _), _ = jax.lax.scan(segment, (x, v, z, mode, zero), last)
+    return Motion(x, v, z, mode)
 
 
 def _remove(minv, rows, speed, stopped):
@@ -162,18 +170,24 @@ def _remove(minv, rows, speed, stopped):
 
 
 def _path(plant, minv, begin, end, mode, load, start, left):
-    """State along the rest of a step: cubic Hermite for x from v, and for v from the accelerations at both ends.
+    """State along the rest of a step: cubic Hermite for x from v, for v from the accelerations at both ends, and so on.
 
     Its error is of the order of the step's own, and it is used at events only.
     """
-    (x, v), (xe, ve) = begin, end
-    h = left * load.step
-    a0 = acceleration(plant, minv, x, v, mode, load.at(start), load.time + start * load.step)[0]
-    a1 = acceleration(plant, minv, xe, ve, mode, load.at(jnp.ones(())), load.time + load.step)[0]
+    (x, v, z), (xe, ve, ze) = begin, end
+    h, one = left * load.step, jnp.ones(())
+    t0, t1 = load.time + start * load.step, load.time + load.step
+    a0 = acceleration(plant, minv, x, v, z, mode, load.at(start), t0)[0]
+    a1 = acceleration(plant, minv, xe, ve, ze, mode, load.at(one), t1)[0]
+    r0 = hidden_rate(plant, x, v, z, t0, load.base[0])
+    r1 = hidden_rate(plant, xe, ve, ze, t1, load.base[2])
 
     def state(s):
         h00, h10, h01, h11 = 2 * s**3 - 3 * s**2 + 1, s**3 - 2 * s**2 + s, 3 * s**2 - 2 * s**3, s**3 - s**2
-        return h00 * x + h10 * h * v + h01 * xe + h11 * h * ve, h00 * v + h10 * h * a0 + h01 * ve + h11 * h * a1
+        return tuple(
+            h00 * y0 + h10 * h * rate0 + h01 * y1 + h11 * h * rate1
+            for y0, rate0, y1, rate1 in ((x, v, xe, ve), (v, a0, ve, a1), (z, r0, ze, r1))
+        )
 
     return state
 
@@ -187,8 +201,8 @@ def _event(plant, minv, path, mode, load, start, left):
 
     def margin(s):
         place = start + left * s
-        x, v = path(s)
-        return acceleration(plant, minv, x, v, mode, load.at(place), load.time + place * load.step)[1]
+        x, v, z = path(s)
+        return acceleration(plant, minv, x, v, z, mode, load.at(place), load.time + place * load.step)[1]
 
     slots = jnp.arange(len(plant.friction))
 

@@ -1,9 +1,9 @@
 """Extended Kalman filter of a plant: what each sample says, given all before it.
 
-The state is (x, v). Between samples the mean follows the plant itself (Runge-Kutta, true stick), the covariance its
-linearisation. Channels are taken one after the other, so that no matrix is inverted and many filters run side by side.
-The mode of friction is uncertain while the speed is smaller than its error: an acceleration is then judged under each
-mode, and the most probable one is used (a max-mixture).
+The state is (x, v, z), z being the hidden states of the laws. Between samples the mean follows the plant itself
+(Runge-Kutta, true stick), the covariance its linearisation. Channels are taken one after the other, so that no matrix
+is inverted and many filters run side by side. The mode of friction is uncertain while the speed is smaller than its
+error: an acceleration is then judged under each mode, and the most probable one is used (a max-mixture).
 """
 
 from typing import NamedTuple
@@ -13,9 +13,13 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..dynamics._grid import Fine, advance_sample, true_force
-from ..dynamics._plant import Plant, Readout, friction_limits, smooth_force
-from ..dynamics._stepper import Motion, acceleration, holding_force, inverse_mass, mode_at
+from ..dynamics._forces import friction_limits, hidden_rate, settle, smooth_force
+from ..dynamics._grid import Fine, advance_sample, begin, load_of, punctual, remember
+from ..dynamics._plant import Plant, Readout
+from ..dynamics._stepper import Load, Motion, acceleration, advance, holding_force, inverse_mass, mode_at
+
+_HALVINGS = 3
+"""Hidden states may relax fast: the series is taken for an eighth of the sample, and squared back."""
 
 
 class Readings(eqx.Module):
@@ -42,7 +46,7 @@ class ProcessNoise(eqx.Module):
 
 
 class Start(eqx.Module):
-    """Mean (dof,) and covariance (2 dof, 2 dof) of the state at the first sample."""
+    """Mean (dof,) of x and v at the first sample, where hidden states are relaxed, and covariance of all of them."""
 
     x: Float[Array, " dof"]
     v: Float[Array, " dof"]
@@ -62,89 +66,119 @@ def _product(a, b):
 
 
 def innovations(
-    plant: Plant, show: Readout, fine: Fine, readings: Readings, noise: ProcessNoise, start: Start, log_scale
+    plant: Plant,
+    show: Readout,
+    fine: Fine,
+    readings: Readings,
+    noise: ProcessNoise,
+    start: Start,
+    log_scale,
 ) -> Innovations:
     """Innovations of one filter run.
 
     `log_scale` (channels,) is the logarithm of the factor on each channel's noise variance. A sample with ``use = 0``
-    is predicted, not used: a stretch of such samples is a free prediction with its own error bar.
+    is predicted, not used: a stretch of such samples is a free prediction with its own error bar. A delay reaches back
+    into the means of the filter.
     """
     minv = inverse_mass(plant)
     dof, dt = plant.dof, fine.step
+    size = 2 * dof + plant.hidden
     variances = readings.variance * jnp.exp(log_scale)
-    added = jnp.zeros((2 * dof, 2 * dof)).at[dof:, dof:].set(noise.velocity)
+    added = jnp.zeros((size, size)).at[dof : 2 * dof, dof : 2 * dof].set(noise.velocity)
+    fine = punctual(plant, fine)
 
     def body(carry, inputs):
-        motion, covariance = carry
+        motion, past, covariance = carry
         force, base, time, y, use, valid = inputs
-        g = true_force(plant, force, base)
+        g = load_of(plant, minv, motion, past, force, base, time, dt)
         mean, updated, error, spread = _update(
-            plant, minv, show, motion, covariance, g[0], base[0], time, y, use, variances
+            plant, minv, show, motion, covariance, Load(g[:3], base[:3], time, dt / fine.substeps), y, use, variances
         )
-        motion = Motion(mean[:dof], mean[dof:], _mode(plant, minv, motion, mean, g[0], time))
-        after = advance_sample(plant, minv, motion, g, time, dt)
+        x, v, z = mean[:dof], mean[dof : 2 * dof], mean[2 * dof :]
+        # A link that sticks stays so while the update leaves it at rest; otherwise its speed decides.
+        motion = Motion(x, v, settle(plant, x, z), mode_at(plant, minv, x, v, z, g[0], time))
+        after = advance_sample(plant, minv, motion, g, base, time, dt)
         step = _transition(plant, minv, motion, after, time, dt)
-        propagated = _settle(plant, minv, _product(_product(step, updated), step.T) + added, after.mode)
+        propagated = _rest(plant, minv, _product(_product(step, updated), step.T) + added, after.mode)
         keep = valid > 0
-        after = Motion(*(jnp.where(keep, new, old) for new, old in zip(after, motion, strict=True)))
-        return (after, jnp.where(keep, propagated, covariance)), Innovations(error, spread)
+        onward = (after, remember(past, x, v), propagated)
+        return jax.tree.map(
+            lambda new, old: jnp.where(keep, new, old), onward, (motion, past, covariance)
+        ), Innovations(error, spread)
 
-    first = true_force(plant, fine.force[0], fine.base[0])[0]
-    motion = Motion(start.x, start.v, mode_at(plant, minv, start.x, start.v, first, fine.time[0]))
+    motion, past = begin(plant, minv, start.x, start.v, fine)
     inputs = (fine.force, fine.base, fine.time, readings.values, readings.use, readings.valid)
-    return jax.lax.scan(body, (motion, start.covariance), inputs)[1]
+    return jax.lax.scan(body, (motion, past, start.covariance), inputs)[1]
 
 
-def _mode(plant, minv, motion, mean, g, time):
-    # A link that sticks stays so while the update leaves it at rest; otherwise its speed decides.
-    return mode_at(plant, minv, mean[: plant.dof], mean[plant.dof :], g, time)
+def _rates(plant, minv, state, t):
+    """Acceleration without friction and rate of the hidden states, as functions of the state alone."""
+    dof = plant.dof
+    x, v, z = state[:dof], state[dof : 2 * dof], state[2 * dof :]
+    zero = jnp.zeros(())
+    return jnp.concatenate([-_times(minv, smooth_force(plant, x, v, z, t)), hidden_rate(plant, x, v, z, t, zero)])
+
+
+def _times(matrix, vector):
+    return jnp.sum(matrix * vector[None, :], 1)
+
+
+def _slopes(plant, minv, state, t):
+    """Derivative of `_rates` by the state, (dof + hidden, state)."""
+    push = jax.vmap(lambda e: jax.jvp(lambda s: _rates(plant, minv, s, t), (state,), (e,))[1])
+    return push(jnp.eye(state.size)).T
 
 
 def _transition(plant, minv, before: Motion, after: Motion, time, dt):
     """Derivative of the state after a sample by the state before it: exponential series of the mid-point slope."""
-    dof = plant.dof
-    x, v = (before.x + after.x) / 2, (before.v + after.v) / 2
-    by_x, by_v = _force_slopes(plant, x, v, time + dt / 2)
-    top = jnp.concatenate([jnp.zeros((dof, dof)), jnp.eye(dof)], 1)
-    bottom = -_product(minv, jnp.concatenate([by_x, by_v], 1))
-    bottom = _held(plant, minv, bottom, (before.mode == 0) & (after.mode == 0))
-    slope = dt * jnp.concatenate([top, bottom], 0)
+    dof, hidden = plant.dof, plant.hidden
+    middle = jnp.concatenate([(a + b) / 2 for a, b in zip(before[:3], after[:3], strict=True)])
+    slopes = _slopes(plant, minv, middle, time + dt / 2)
+    top = jnp.concatenate([jnp.zeros((dof, dof)), jnp.eye(dof), jnp.zeros((dof, hidden))], 1)
+    held = _held(plant, minv, slopes[:dof], (before.mode == 0) & (after.mode == 0))
+    halvings = _HALVINGS if hidden else 0
+    slope = dt / 2**halvings * jnp.concatenate([top, held, slopes[dof:]], 0)
     square = _product(slope, slope)
-    return jnp.eye(2 * dof) + slope + square / 2 + _product(square, slope) / 6 + _product(square, square) / 24
-
-
-def _force_slopes(plant, x, v, t):
-    dof = plant.dof
-    basis = jnp.eye(2 * dof)
-    columns = jax.vmap(lambda e: jax.jvp(lambda x, v: smooth_force(plant, x, v, t), (x, v), (e[:dof], e[dof:]))[1])(
-        basis
+    step = jnp.eye(slope.shape[0]) + slope + square / 2 + _product(square, slope) / 6 + _product(square, square) / 24
+    for _ in range(halvings):
+        step = _product(step, step)
+    if not hidden:
+        return step
+    # What is put back within its bounds at the end of the step follows the bound from there on.
+    kept = jax.vmap(lambda e: jax.jvp(lambda x, z: settle(plant, x, z), (after.x, after.z), (e[:dof], e[dof:]))[1])
+    bounds = kept(jnp.eye(dof + hidden)).T
+    return jnp.concatenate(
+        [step[: 2 * dof], _product(bounds[:, :dof], step[:dof]) + _product(bounds[:, dof:], step[2 * dof :])]
     )
-    return columns[:dof].T, columns[dof:].T
 
 
-def _settle(plant, minv, covariance, mode):
+def _rest(plant, minv, covariance, mode):
     """Covariance once a link sticks: its speed is known to be zero."""
     slots = plant.friction
     dof = plant.dof
     for i in range(len(slots)):
-        row = jnp.concatenate([jnp.zeros(dof), slots.direction[i]])
-        effect = jnp.concatenate([jnp.zeros(dof), jnp.sum(minv * slots.direction[i][None, :], 1)])
+        still, hidden = jnp.zeros(dof), jnp.zeros(plant.hidden)
+        row = jnp.concatenate([still, slots.direction[i], hidden])
+        effect = jnp.concatenate([still, jnp.sum(minv * slots.direction[i][None, :], 1), hidden])
         scale = jnp.sum(row * effect)
-        project = jnp.eye(2 * dof) - effect[:, None] * row[None, :] / jnp.where(scale > 0, scale, 1.0)
+        project = jnp.eye(row.size) - effect[:, None] * row[None, :] / jnp.where(scale > 0, scale, 1.0)
         stuck = _product(_product(project, covariance), project.T)
         covariance = jnp.where((mode[i] == 0) & (scale > 0), stuck, covariance)
     return covariance
 
 
-def _update(plant, minv, show, motion, covariance, g, base, time, y, use, variances):
-    """State after the readings of one sample, and their innovations."""
-    mean = jnp.concatenate([motion.x, motion.v])
+def _update(plant, minv, show, motion: Motion, covariance, load: Load, y, use, variances):
+    """State after the readings of one sample, and their innovations; `load` is that of the sample's first step."""
+    mean = jnp.concatenate([motion.x, motion.v, motion.z])
     errors, spreads = [], []
     for c in range(y.shape[0]):
         gain = 1.0 + plant.channel_gain[c]
-        predicted, row = _predict(
-            plant, minv, show, c, mean, covariance, motion.mode, g, base, time, y[c], variances[c], gain
-        )
+        if plant.channel_delay.size:
+            predicted, row = _late(plant, minv, show, c, mean, motion.mode, load)
+        else:
+            predicted, row = _predict(
+                plant, minv, show, c, mean, covariance, motion.mode, load, y[c], variances[c], gain
+            )
         error = y[c] - gain * predicted - plant.channel_offset[c]
         row = gain * row
         cross = jnp.sum(covariance * row[None, :], 1)
@@ -157,26 +191,52 @@ def _update(plant, minv, show, motion, covariance, g, base, time, y, use, varian
     return mean, covariance, jnp.stack(errors), jnp.stack(spreads)
 
 
-def _predict(plant, minv, show, c, mean, covariance, mode, g, base, time, y, variance, gain):
+def _predict(plant, minv, show, c, mean, covariance, mode, load: Load, y, variance, gain):
     """Reading of channel `c` without gain and offset, and its derivative by the state."""
     dof = plant.dof
-    select, none = show.select[c], jnp.zeros(dof)
+    select, none, hidden = show.select[c], jnp.zeros(dof), jnp.zeros(plant.hidden)
     if show.kinds[c] == "displacement":
-        return jnp.sum(select * mean[:dof]), jnp.concatenate([select, none])
+        return jnp.sum(select * mean[:dof]), jnp.concatenate([select, none, hidden])
     if show.kinds[c] == "velocity":
-        return jnp.sum(select * mean[dof:]), jnp.concatenate([none, select])
+        return jnp.sum(select * mean[dof : 2 * dof]), jnp.concatenate([none, select, hidden])
     if len(plant.friction) == 1:
-        a, slope = _most_probable_mode(plant, minv, select, c, mean, covariance, g, base, time, y, variance, gain)
+        a, slope = _most_probable_mode(plant, minv, select, c, mean, covariance, load, y, variance, gain)
     else:
-        a, slope = _acceleration_and_slope(plant, minv, mean, mode, g, time)
-    return jnp.sum(select * (a + base)), jnp.sum(select[:, None] * slope, 0)
+        a, slope = _acceleration_and_slope(plant, minv, mean, mode, load)
+    return jnp.sum(select * (a + load.base[0])), jnp.sum(select[:, None] * slope, 0)
 
 
-def _acceleration_and_slope(plant, minv, mean, mode, g, time):
+def _late(plant, minv, show, c, mean, mode, load: Load):
+    """As `_predict`, of a channel that shows the motion of a moment ago: one step back in time."""
     dof = plant.dof
-    a = acceleration(plant, minv, mean[:dof], mean[dof:], mode, g, time)[0]
-    by_x, by_v = _force_slopes(plant, mean[:dof], mean[dof:], time)
-    return a, _held(plant, minv, -_product(minv, jnp.concatenate([by_x, by_v], 1)), mode == 0)
+
+    def reading(mean):
+        tau = plant.channel_delay[c]
+        now = Motion(mean[:dof], mean[dof : 2 * dof], mean[2 * dof :], mode)
+        back = _backward(load, tau)
+        then = advance(plant, minv, now, back)
+        a = acceleration(plant, minv, *then, back.force[2], back.time - tau)[0]
+        shown = {"displacement": then.x, "velocity": then.v, "acceleration": a + back.base[2]}
+        return jnp.sum(show.select[c] * shown[show.kinds[c]])
+
+    value, rows = jax.vmap(lambda e: jax.jvp(reading, (mean,), (e,)), out_axes=(None, 0))(jnp.eye(mean.size))
+    return value, rows
+
+
+def _backward(load: Load, tau) -> Load:
+    """A step of -tau from where a load begins, its force continued by the parabola."""
+    shares = -tau / load.step * jnp.array([0.0, 0.5, 1.0])
+    force = jnp.stack([load.at(shares[i]) for i in range(3)])
+    a, b, c = load.base[0], load.base[1], load.base[2]
+    base = a + shares * (4 * b - 3 * a - c) + shares * shares * (2 * a + 2 * c - 4 * b)
+    return Load(force, base, load.time, -tau)
+
+
+def _acceleration_and_slope(plant, minv, mean, mode, load: Load):
+    dof = plant.dof
+    x, v, z = mean[:dof], mean[dof : 2 * dof], mean[2 * dof :]
+    a = acceleration(plant, minv, x, v, z, mode, load.force[0], load.time)[0]
+    return a, _held(plant, minv, _slopes(plant, minv, mean, load.time)[:dof], mode == 0)
 
 
 def _held(plant, minv, slope, sticking):
@@ -190,15 +250,16 @@ def _held(plant, minv, slope, sticking):
     return slope
 
 
-def _most_probable_mode(plant, minv, select, c, mean, covariance, g, base, time, y, variance, gain):
+def _most_probable_mode(plant, minv, select, c, mean, covariance, load: Load, y, variance, gain):
     """Acceleration and slope in the mode that the reading and the estimated speed make most probable."""
     dof = plant.dof
     row = plant.friction.direction[0]
-    speed = jnp.sum(row * mean[dof:])
-    spread = jnp.sqrt(jnp.maximum(jnp.sum(row[:, None] * covariance[dof:, dof:] * row[None, :]), 0.0))
+    x, v, z = mean[:dof], mean[dof : 2 * dof], mean[2 * dof :]
+    speed = jnp.sum(row * v)
+    spread = jnp.sqrt(jnp.maximum(jnp.sum(row[:, None] * covariance[dof : 2 * dof, dof : 2 * dof] * row[None, :]), 0.0))
     certain = jnp.where(spread > 0, speed / jnp.where(spread > 0, spread, 1.0), jnp.sign(speed) * 40.0)
-    low, high = friction_limits(plant, mean[:dof], jnp.zeros(dof), time)
-    free = jnp.sum(minv * (g - smooth_force(plant, mean[:dof], mean[dof:], time))[None, :], 1)
+    low, high = friction_limits(plant, x, jnp.zeros(dof), load.time)
+    free = _times(minv, load.force[0] - smooth_force(plant, x, v, z, load.time))
     held = holding_force(plant, minv, free, jnp.ones(1, bool))[0]
     can_stick = (held <= high[0]) & (held >= low[0])
     weights = (
@@ -208,10 +269,10 @@ def _most_probable_mode(plant, minv, select, c, mean, covariance, g, base, time,
     )
 
     def judge(mode, weight):
-        a, slope = _acceleration_and_slope(plant, minv, mean, mode[None], g, time)
+        a, slope = _acceleration_and_slope(plant, minv, mean, mode[None], load)
         line = gain * jnp.sum(select[:, None] * slope, 0)
         total = jnp.sum(line[:, None] * covariance * line[None, :]) + variance
-        error = y - gain * jnp.sum(select * (a + base)) - plant.channel_offset[c]
+        error = y - gain * jnp.sum(select * (a + load.base[0])) - plant.channel_offset[c]
         return weight - error**2 / (2 * total) - jnp.log(total) / 2, a, slope
 
     scores, values, slopes = jax.vmap(judge)(jnp.array([1.0, -1.0, 0.0]), jnp.stack(weights))

@@ -17,8 +17,9 @@ import numpy as np
 import scipy.linalg
 from jaxtyping import Array, Float
 
+from ..dynamics._along import run_force_along
 from ..dynamics._grid import Fine
-from ..dynamics._plant import Plant, Readout, friction_limits, smooth_force
+from ..dynamics._plant import Plant, Readout
 
 _MEMORIES = (0.15, 1.0)
 """τ of the latent force, in radians of the motion."""
@@ -99,7 +100,7 @@ def latent_force(
     mean, std = (np.asarray(out) for out in _smooth(best, *data))
     dof = plant.dof
     x, v, r = mean[:, :dof], mean[:, dof : 2 * dof], mean[:, 2 * dof :]
-    known = np.asarray(_nonlinear(plant, jnp.asarray(x), jnp.asarray(v), fine.time[:n]))
+    known = np.asarray(run_force_along(plant, jnp.asarray(x), jnp.asarray(v), fine.time[:n]))
     return Latent(x, v, r - known, std[:, 2 * dof :])
 
 
@@ -182,18 +183,3 @@ def _smooth(model: _Model, force, values, use, variance):
     means = jnp.concatenate([means, mean[-1:]])
     variances = jnp.concatenate([variances, jnp.diag(covariance[-1])[None]])
     return means, jnp.sqrt(jnp.maximum(variances, 0.0))
-
-
-@eqx.filter_jit
-def _nonlinear(plant: Plant, x, v, time):
-    """What the model says of nonlinear terms and friction along the motion."""
-
-    def one(x, v, t):
-        force = smooth_force(plant, x, v, t) - plant.stiffness @ x - plant.damping @ v
-        if len(plant.friction):
-            low, high = friction_limits(plant, x, v, t)
-            speed = plant.friction.direction @ v
-            force = force + jnp.where(speed > 0, high, jnp.where(speed < 0, low, 0.0)) @ plant.friction.direction
-        return force
-
-    return jax.vmap(one)(x, v, time)

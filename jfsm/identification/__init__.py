@@ -13,6 +13,8 @@ from ._posterior import LANES as LANES
 from ._posterior import Hypothesis as Hypothesis
 from ._posterior import Posterior as Posterior
 from ._posterior import prior as prior
+from ._unknowns import DEGREES as DEGREES
+from ._unknowns import DEGREES_BESIDE as DEGREES_BESIDE
 from ._unknowns import Unknown as Unknown
 from ._unknowns import effect_unknown as effect_unknown
 from ._unknowns import free_unknown as free_unknown

@@ -10,15 +10,18 @@ from .._types import require_x64
 from ..dynamics import Reconstruction
 from ..records import Record
 from ..structures import Structure
-from ._maximise import maximise
+from ._maximise import Maximum, approach, finish
 from ._nuisances import Nuisances, prepare
-from ._posterior import Hypothesis, Posterior
+from ._posterior import Hypothesis, Posterior, lanes_of
+from ._starts import starts
 from ._unknowns import Unknown, bounded, free_unknown, nuisance_unknowns, with_offsets
 
 _TIED = 0.98
 """Correlation from which two values cannot be told apart in practice,"""
 _SURE = 0.05
 """unless each is known to this relative standard error all the same."""
+_PURSUED = 2
+"""Beginnings that are followed to the top."""
 _LOOSE = 0.5
 """Relative standard error from which a value is hardly determined."""
 
@@ -93,14 +96,12 @@ def fit(
         raise ValueError("`record` must hold at least one record; the sequence is empty.")
     prepared = [prepare(r, model, reconstruction) for r in records]
     free = free_paths(model, prepared, fixed)
-    structure = with_offsets(model, prepared)
-    unknowns = [free_unknown(structure, path, prepared[0]) for path in free]
-    unknowns = _bounded(unknowns, bounds or {}, model)
-    for index, nuisances in enumerate(prepared):
-        unknowns += nuisance_unknowns(structure, nuisances, index)
-    posterior = Posterior(Hypothesis((structure,), (tuple(unknowns),)), prepared)
-    best = maximise(posterior)
-    theta, covariance = best.theta[0], np.linalg.pinv(best.information[0], hermitian=True)
+    held = {path: value for path, value in model.values().items() if path not in free}
+    beginnings = [model, *(start.with_values(held) for start in starts(model, prepared[0]))]
+    posterior, best, lane = _best([_beginning(m, free, prepared, bounds or {}) for m in beginnings], prepared)
+    unknowns, structure = posterior.hypothesis.unknowns[lane], posterior.hypothesis.structures[lane]
+    theta = best.theta[lane]
+    covariance = sandwich(best.information[lane], posterior.scatter(best.theta)[lane])
     error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     intervals = {}
     for u, t, s in zip(unknowns[: len(free)], theta, error, strict=False):
@@ -109,13 +110,51 @@ def fit(
     correlation = covariance / np.maximum(np.outer(error, error), 1e-300)
     pairs = {(free[i], free[j]): float(correlation[i, j]) for i in range(len(free)) for j in range(i)}
     values = {u.path: u.value(t) for u, t in zip(unknowns[: len(free)], theta, strict=False)}
-    kept = without_small_offsets(posterior.structure(theta), unknowns, theta, error)
+    kept = without_small_offsets(posterior.structure(theta, lane), unknowns, theta, error)
     noise = {
         f"{kind} {j}": float(f * np.exp(t / 2))
         for (kind, j), f, t in zip(prepared[0].channels, prepared[0].floor, _scales(unknowns, theta), strict=False)
     }
     words = _words(unknowns[: len(free)], theta, error, pairs, structure)
-    return Fit(kept, values, intervals, pairs, words, -float(best.value[0]), noise, best.results[0])
+    return Fit(kept, values, intervals, pairs, words, -float(best.value[lane]), noise, best.results[lane])
+
+
+def sandwich(information: np.ndarray, scatter: np.ndarray) -> np.ndarray:
+    """Covariance of the estimate: H⁻¹ J H⁻¹ where it is wider than H⁻¹, [1]_ Theorem 3.2.
+
+    H is the information, J the covariance of the gradient as the record shows it. They agree where the model is right
+    and the noise white; where they do not, J knows better. It is an estimate itself, so that it widens, never narrows.
+
+    References
+    ----------
+    .. [1] H. White, Econometrica 50 (1982) 1-25.
+    """
+    inverse = np.linalg.pinv(information, hermitian=True)
+    wide = inverse @ scatter @ inverse
+    ratio = np.sqrt(np.maximum(np.diag(wide) / np.maximum(np.diag(inverse), 1e-300), 1.0))
+    return inverse * ratio[:, None] * ratio[None, :]
+
+
+def _beginning(
+    model: Structure, free: Sequence[str], prepared: Sequence[Nuisances], bounds: Mapping[str, tuple[float, float]]
+) -> tuple[Structure, tuple[Unknown, ...]]:
+    structure = with_offsets(model, prepared)
+    unknowns = _bounded([free_unknown(structure, path, prepared[0]) for path in free], bounds, model)
+    for index, nuisances in enumerate(prepared):
+        unknowns += nuisance_unknowns(structure, nuisances, index)
+    return structure, tuple(unknowns)
+
+
+def _best(beginnings: Sequence[tuple], prepared: Sequence[Nuisances]) -> tuple[Posterior, Maximum, int]:
+    """The highest top that a climb from any of the beginnings ends at, and its lane."""
+    lanes = lanes_of(beginnings[0][0])
+    lots = [beginnings[i : i + lanes] for i in range(0, len(beginnings), lanes)]
+    posteriors = [Posterior(Hypothesis(*zip(*lot, strict=True)), prepared) for lot in lots]
+    rungs = [approach(posterior) for posterior in posteriors]
+    order = np.argsort([float(np.min(rung.value)) for rung in rungs])[:_PURSUED]
+    tops = [(posteriors[k], finish(posteriors[k], rungs[k])) for k in order]
+    posterior, best = min(tops, key=lambda top: float(np.min(top[1].value)))
+    return posterior, best, int(np.argmin(best.value))
 
 
 def free_paths(model: Structure, records: Sequence[Nuisances], fixed: Sequence[str]) -> tuple[str, ...]:
@@ -130,7 +169,9 @@ def free_paths(model: Structure, records: Sequence[Nuisances], fixed: Sequence[s
         held.update(paths)
     if not any(n.fine.force.any() or n.fine.base.any() for n in records):
         held.update(model.select("mass"))
-    return tuple(p for p in model.entries() if p not in held and not p.startswith("offset@"))
+    return tuple(
+        p for p, (what, _) in model.entries().items() if p not in held and what.free and not p.startswith("offset@")
+    )
 
 
 def without_small_offsets(

@@ -5,6 +5,7 @@ matrix is the plant. That matrix is data: another place, sign or law leaves the 
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -13,12 +14,23 @@ from jaxtyping import Array, Float
 from ..dynamics._plant import Channel, Plant, lower
 from ..structures import Structure
 
-_PARTS = ("mass", "damping", "stiffness", "force_gain", "force_offset", "channel_gain", "channel_offset")
+_PARTS = (
+    "mass",
+    "damping",
+    "stiffness",
+    "force_gain",
+    "force_offset",
+    "force_delay",
+    "channel_gain",
+    "channel_offset",
+    "channel_delay",
+)
+_SLOTS = ("smooth", "friction", "memory", "delayed")
 
 
 def plant_vector(plant: Plant) -> Float[np.ndarray, " size"]:
     """All numbers of a plant that parameters can change, in one row."""
-    parts = [getattr(plant, name) for name in _PARTS] + [plant.smooth.parameters, plant.friction.parameters]
+    parts = [getattr(plant, name) for name in _PARTS] + [getattr(plant, name).parameters for name in _SLOTS]
     return np.concatenate([np.asarray(part).ravel() for part in parts])
 
 
@@ -29,17 +41,16 @@ def with_vector(plant: Plant, vector: Float[Array, " size"]) -> Plant:
         shape = getattr(plant, name).shape
         size = int(np.prod(shape))
         parts[name], place = jnp.reshape(vector[place : place + size], shape), place + size
-    slots = []
-    for old in (plant.smooth, plant.friction):
+    for name in _SLOTS:
+        old = getattr(plant, name)
         size = int(np.prod(old.parameters.shape))
         row = jnp.reshape(vector[place : place + size], old.parameters.shape)
-        slots.append(type(old)(old.kind, row, old.direction, old.laws))
-        place += size
-    return Plant(**parts, smooth=slots[0], friction=slots[1], maps=plant.maps)
+        parts[name], place = type(old)(old.kind, row, old.direction, old.laws), place + size
+    return Plant(**parts, maps=plant.maps, reach=plant.reach)
 
 
 def plant_rows(
-    structure: Structure, paths: Sequence[str], channels: Sequence[Channel], **slots: int
+    structure: Structure, paths: Sequence[str], channels: Sequence[Channel], **slots: Any
 ) -> Float[np.ndarray, "paths size"]:
     """Derivative of the plant's vector by each of the structure's numbers `paths`.
 

@@ -20,8 +20,8 @@ from ..dynamics._plant import Plant, Readout
 from ..estimation._filter import Innovations, ProcessNoise, Readings, Start, innovations
 from ._layout import with_vector
 
-_START_VARIANCE = 1e-12
-"""Variance of the initial state in units of its size: the state itself is among the unknowns."""
+_BLOCKS = 64
+"""Stretches of a record whose gradients count as independent of each other."""
 
 
 class Lanes(eqx.Module):
@@ -34,15 +34,14 @@ class Lanes(eqx.Module):
 
 
 def _run(
-    plant: Plant, lane, theta, show: Readout, fine: Fine, readings: Readings, noise: ProcessNoise, size
+    plant: Plant, lane, theta, show: Readout, fine: Fine, readings: Readings, noise: ProcessNoise, doubt
 ) -> Innovations:
     base, rows, unit, log = lane
     value = unit * jnp.where(log > 0, jnp.exp(jnp.where(log > 0, theta, 0.0)), theta)
     numbers = base + jnp.sum(rows * value[:, None], 0)
     dof, channels = plant.dof, readings.values.shape[1]
     tail = numbers[numbers.size - 2 * dof - channels :]
-    covariance = _START_VARIANCE * jnp.diag(size**2)
-    start = Start(tail[:dof], tail[dof : 2 * dof], covariance)
+    start = Start(tail[:dof], tail[dof : 2 * dof], jnp.diag(doubt**2))
     return innovations(with_vector(plant, numbers), show, fine, readings, noise, start, tail[2 * dof :])
 
 
@@ -52,8 +51,9 @@ def _axes(plant: Plant):
 
 
 @eqx.filter_jit
-def derivatives(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, size, until):
-    """Minus log-likelihood (lanes,), its gradient (lanes, unknowns) and the information (lanes, unknowns, unknowns).
+def derivatives(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, doubt, until):
+    """Minus log-likelihood (lanes,), its gradient (lanes, unknowns), and two matrices (lanes, unknowns, unknowns): the
+    information, and the sum of outer products of the gradients of `_BLOCKS` stretches of the record.
 
     Samples from index `until` on take no part. `plant` has a leading axis of lanes on every floating leaf.
     """
@@ -61,7 +61,7 @@ def derivatives(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, 
 
     def one(plant, base, rows, unit, log, theta):
         def outcome(theta):
-            found = _run(plant, (base, rows, unit, log), theta, show, fine, readings, noise, size)
+            found = _run(plant, (base, rows, unit, log), theta, show, fine, readings, noise, doubt)
             return found.error, jnp.log(found.variance)
 
         push = partial(jax.jvp, outcome, (theta,))
@@ -71,19 +71,23 @@ def derivatives(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, 
         e, de, ds = error * deviation, by_error * deviation[None], by_variance * root[None]
         value = 0.5 * jnp.sum(e**2 + counted * (log_variance + jnp.log(2 * jnp.pi)))
         de, ds = (array.reshape(theta.size, -1) for array in (de, ds))
-        gradient = de @ e.ravel() + 0.5 * ds @ (root - e**2 / jnp.maximum(root, 1e-30)).ravel()
-        return value, gradient, de @ de.T + 0.5 * ds @ ds.T
+        # d(log L)/d(theta) of every reading; their sum is the gradient, their sums over stretches tell how it scatters.
+        scores = de * e.ravel()[None] + 0.5 * ds * (root - e**2 / jnp.maximum(root, 1e-30)).ravel()[None]
+        block = jnp.arange(counted.shape[0]) * _BLOCKS // jnp.maximum(until, 1)
+        inside = jax.nn.one_hot(block, _BLOCKS, dtype=scores.dtype)
+        stretches = jnp.sum(scores.reshape(theta.size, counted.shape[0], -1), 2) @ inside
+        return value, jnp.sum(scores, 1), de @ de.T + 0.5 * ds @ ds.T, stretches @ stretches.T
 
     mapped = jax.vmap(one, in_axes=(_axes(plant), 0, 0, 0, 0, 0))
     return mapped(plant, lanes.base, lanes.rows, lanes.unit, lanes.log, theta)
 
 
 @eqx.filter_jit
-def predictions(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, size) -> Innovations:
+def predictions(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, doubt) -> Innovations:
     """Innovations (lanes, n, channels) of every lane."""
 
     def one(plant, base, rows, unit, log, theta):
-        return _run(plant, (base, rows, unit, log), theta, show, fine, readings, noise, size)
+        return _run(plant, (base, rows, unit, log), theta, show, fine, readings, noise, doubt)
 
     return jax.vmap(one, in_axes=(_axes(plant), 0, 0, 0, 0, 0))(
         plant, lanes.base, lanes.rows, lanes.unit, lanes.log, theta

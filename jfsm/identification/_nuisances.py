@@ -6,7 +6,15 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..dynamics._drive import Reconstruction
-from ..dynamics._excitation import bucket, excitation, fastest_mode, measured_force, substeps_for
+from ..dynamics._excitation import (
+    bucket,
+    excitation,
+    fastest_mode,
+    force_limits,
+    measured_force,
+    substeps_for,
+    typical_speed,
+)
 from ..dynamics._grid import Fine
 from ..dynamics._plant import Channel, Readout, readout
 from ..dynamics._simulate import check_pair
@@ -115,9 +123,9 @@ def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "
         if np.any(lost):
             use[lost, i] = 0.0
             notes.append(f"{kind} {j}: {int(lost.sum())} clipped or torn samples take no part.")
-    force, force_variance, share, words = _force(record, dof)
+    force, force_variance, share, words = _force(record, model)
     notes += words
-    omega = fastest_mode(model) or 2 * np.pi / max(record.duration, dt)
+    omega = fastest_mode(model) or _rate(values[:, 0], dt)
     length, crest = _size(channels, values, spread, omega)
     masses = np.asarray(model.mass)
     mass = masses if masses.ndim == 1 else np.diag(masses)
@@ -144,7 +152,9 @@ def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "
         record=record,
         channels=channels,
         show=readout(channels, dof),
-        fine=excitation(record, dof, substeps_for(model, dt), reconstruction, length=padded, force=force),
+        fine=excitation(
+            record, dof, substeps_for(model, dt, typical_speed(record)), reconstruction, length=padded, force=force
+        ),
         readings=readings,
         noise=ProcessNoise(jnp.asarray(disturbed)),
         force_variance=force_variance,
@@ -162,13 +172,19 @@ def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "
     )
 
 
-def _force(record: Record, dof: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
+def _rate(y: np.ndarray, dt: float) -> float:
+    """Angular frequency at which a channel goes up and down, where no spring tells one [rad/s]."""
+    return float(np.std(np.diff(y)) / (dt * np.std(y)))
+
+
+def _force(record: Record, model: Structure) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
     """Force samples to run with, variance of their noise, share of it left in them, and notes.
 
     Where the force is smooth on its own grid, its noise is smoothed away; where it fills the band, the spline's
     residual is signal, and the noise is taken as a thousandth of the force.
     """
-    force, notes = measured_force(record, dof), []
+    restored, dof, notes = force_limits(model), model.dof, []
+    force = measured_force(record, dof, restored)
     variance, share = np.zeros(dof), np.ones(dof)
     for (kind, j), samples in record.channels.items():
         if kind != "force":
@@ -177,11 +193,11 @@ def _force(record: Record, dof: int) -> tuple[np.ndarray, np.ndarray, np.ndarray
             if np.any(samples):
                 notes.append(f"force {j} holds nothing but noise and counts as zero.")
             continue
-        if np.any(clipped(samples)):
+        if (kind, j) not in restored and np.any(clipped(samples)):
             notes.append(
                 f"force {j} looks clipped; its true peaks are not known, which shows as an unexplained effect."
             )
-        floor = noise_floor(samples, record.dt)
+        floor = noise_floor(force[:, j - 1], record.dt)
         if floor.spacing >= _OVERSAMPLED:
             force[:, j - 1] = floor.smooth
             variance[j - 1], share[j - 1] = floor.std**2, floor.effective_parameters / samples.size

@@ -8,17 +8,24 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..dynamics._plant import Plant, lower
+from ..dynamics._plant import Grid, Plant, hidden_width, lower
 from ..estimation._filter import Innovations, ProcessNoise
-from ..structures import Structure
+from ..structures import AbstractFriction, Structure
 from ._layout import plant_rows, plant_vector
 from ._likelihood import Lanes, derivatives, predictions
 from ._nuisances import Nuisances
-from ._unknowns import DEGREES, Unknown
+from ._unknowns import Unknown
 
 LANES = 2
 """Starts that run side by side where nothing sticks; a single one is doubled, so that one program serves all."""
+_KNOWN_START, _HIDDEN_START = 1e-6, 0.3
+"""Doubt about the initial state, and about hidden states there, as shares of the motion's size."""
 _WIDTHS = (12, 16, 20, 24, 32, 48, 64, 96, 128)
+
+
+def lanes_of(structure: Structure) -> int:
+    """Starts of such a structure that run side by side: reversals make a lane dear, and a program slow to compile."""
+    return 1 if any(isinstance(term, AbstractFriction) for term in structure.terms) else LANES
 
 
 @dataclass(frozen=True)
@@ -46,8 +53,7 @@ class Posterior:
         self.hypothesis, self.records = hypothesis, tuple(records)
         self.until = tuple(n.samples for n in records) if until is None else tuple(until)
         count = len(hypothesis.structures)
-        # Reversals make a lane dear and a program slow to compile: one start at a time there.
-        lanes = 1 if len(lower(hypothesis.structures[0]).friction) else LANES
+        lanes = lanes_of(hypothesis.structures[0])
         if count > lanes:
             raise ValueError(f"At most {lanes} starts fit into one call; got {count}.")
         self._pick = [min(i, count - 1) for i in range(lanes)]
@@ -68,14 +74,21 @@ class Posterior:
 
         `slack` is the share of unmodelled force forgiven; of every record at most `most` samples count.
         """
+        return self._evaluate(theta, slack, most)[:3]
+
+    def scatter(self, theta: np.ndarray) -> np.ndarray:
+        """Covariance (lanes, unknowns, unknowns) of the gradient as the record itself shows it, from its stretches."""
+        return self._evaluate(theta)[3]
+
+    def _evaluate(self, theta: np.ndarray, slack: float = 0.0, most: int | None = None):
         lanes, size = theta.shape
         value, gradient, information = np.zeros(lanes), np.zeros((lanes, size)), np.zeros((lanes, size, size))
+        scatter = np.zeros_like(information)
         for nuisances, end, (plant, maps, mine) in zip(self.records, self.until, self._parts, strict=True):
             until = end if most is None else min(end, most)
             width = maps.unit.shape[1]
             inner = np.zeros((len(self._pick), width))
             inner[:, : len(mine)] = theta[self._pick][:, mine]
-            scale = jnp.asarray(np.repeat([nuisances.length, nuisances.length * nuisances.omega], plant.mass.shape[-1]))
             fine, readings = nuisances.head(until)
             out = derivatives(
                 plant,
@@ -85,19 +98,20 @@ class Posterior:
                 fine,
                 readings,
                 slackened(nuisances, slack),
-                scale,
+                _doubt(plant, nuisances),
                 jnp.asarray(until),  # as a plain number it would be part of the program
             )
-            v, g, f = (np.asarray(o)[:lanes] for o in out)
+            v, g, f, s = (np.asarray(o)[:lanes] for o in out)
             value += v
             gradient[:, mine] += g[:, : len(mine)]
             information[:, mine[:, None], mine[None, :]] += f[:, : len(mine), : len(mine)]
+            scatter[:, mine[:, None], mine[None, :]] += s[:, : len(mine), : len(mine)]
         for lane in range(lanes):
             p, pg, pf = prior(self.hypothesis.unknowns[lane], theta[lane])
             value[lane] += p
             gradient[lane] += pg
             information[lane] += np.diag(pf)
-        return value, gradient, information
+        return value, gradient, information, scatter
 
     def innovations(
         self,
@@ -127,7 +141,6 @@ class Posterior:
             padded = np.zeros(readings.use.shape)
             padded[: len(use)] = use
             readings = replace_use(readings, padded)
-        scale = jnp.asarray(np.repeat([nuisances.length, nuisances.length * nuisances.omega], plant.mass.shape[-1]))
         found = predictions(
             plant,
             maps,
@@ -136,7 +149,7 @@ class Posterior:
             nuisances.fine,
             readings,
             slackened(nuisances, slack),
-            scale,
+            _doubt(plant, nuisances),
         )
         n = nuisances.samples
         return Innovations(np.asarray(found.error)[0, :n], np.asarray(found.variance)[0, :n])  # pyright: ignore[reportArgumentType]
@@ -153,7 +166,8 @@ class Posterior:
         structures = [self.hypothesis.structures[i] for i in self._pick]
         mine = np.array([k for k, u in enumerate(self.hypothesis.unknowns[0]) if u.record in (None, index)])
         width = next(w for w in _WIDTHS if w >= len(mine))
-        slots = {"smooth_slots": _slot_bucket(structures[0])}
+        grid = Grid(float(nuisances.record.dt), nuisances.fine.substeps)
+        slots = {"smooth_slots": _slot_bucket(structures[0]), "grid": grid}
         plants = [lower(s, nuisances.channels, **slots) for s in structures]
         packed = {}
         for lane in set(self._pick):
@@ -195,9 +209,25 @@ def _lane(structure, unknowns, nuisances: Nuisances, vector, width, slots):
     return base, rows, unit, log
 
 
+def _doubt(plant: Plant, nuisances: Nuisances):
+    """Standard deviation of the state at the first sample.
+
+    Displacement and velocity are among the unknowns themselves. Hidden states are not: unless the record began at rest
+    they may be anything up to the size of the motion.
+    """
+    length, speed = nuisances.length, nuisances.length * nuisances.omega
+    known = _KNOWN_START * np.repeat([length, speed], plant.mass.shape[-1])
+    share = 0.0 if nuisances.at_rest else _HIDDEN_START
+    hidden = share * np.resize([length, speed], plant.memory.kind.shape[0] * hidden_width(plant.memory))
+    return jnp.asarray(np.concatenate([known, hidden]))
+
+
 def _slot_bucket(structure: Structure) -> int:
     """Smooth slots of the program: one for a candidate beside a linear model, then powers of two."""
-    count = len(lower(structure).smooth)
+    plant = lower(structure)
+    count = len(plant.smooth)
+    if count == 0 and (len(plant.friction) or len(plant.memory) or len(plant.delayed)):
+        return 0  # in a program of its own anyway
     return 1 if count <= 1 else 2 ** math.ceil(math.log2(count))
 
 
@@ -219,15 +249,17 @@ def prior(unknowns: Sequence[Unknown], theta: np.ndarray) -> tuple[float, np.nda
     value, gradient, curvature = 0.0, np.zeros(theta.size), np.zeros(theta.size)
     for k, (u, t) in enumerate(zip(unknowns, theta, strict=True)):
         r = (t - u.center) / u.width
-        if u.heavy:
-            spread = DEGREES + r * r
-            value += (DEGREES + 1) / 2 * math.log(spread / DEGREES) + math.log(u.width) + _STUDENT
-            gradient[k] = (DEGREES + 1) * r / (u.width * spread)
-            curvature[k] = (DEGREES + 1) / (u.width**2 * spread)
+        if math.isfinite(u.degrees):
+            spread = u.degrees + r * r
+            value += (u.degrees + 1) / 2 * math.log(spread / u.degrees) + math.log(u.width) + _student(u.degrees)
+            gradient[k] = (u.degrees + 1) * r / (u.width * spread)
+            curvature[k] = (u.degrees + 1) / (u.width**2 * spread)
         else:
             value += r * r / 2 + math.log(u.width) + 0.5 * math.log(2 * math.pi)
             gradient[k], curvature[k] = r / u.width, 1 / u.width**2
     return value, gradient, curvature
 
 
-_STUDENT = math.lgamma(DEGREES / 2) + 0.5 * math.log(DEGREES * math.pi) - math.lgamma((DEGREES + 1) / 2)
+def _student(degrees: float) -> float:
+    """Logarithm of the constant of Student's law."""
+    return math.lgamma(degrees / 2) + 0.5 * math.log(degrees * math.pi) - math.lgamma((degrees + 1) / 2)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..structures import Offset, Structure
+from ..structures import AccelerationBias, Offset, Preload, Structure
 from ._nuisances import Nuisances
 
 TRUST = {"stiffness": 0.02, "damping": 0.25, "mass": 0.01}
@@ -15,8 +15,11 @@ _REACH = {"stiffness": math.log(5.0), "mass": math.log(5.0), "damping": math.log
 """Logarithm of the factor by which an own value may be off; beyond it another structure was measured."""
 DEGREES = 1.5
 """Degrees of freedom of Student's law for own values: right to some per cent as a rule, but far off when wrong."""
+DEGREES_BESIDE = 4.0
+"""The same beside a cause that is named: a value that is far off as well would be a second fault."""
 TYPICAL, TYPICAL_SPREAD = 0.15, 1.5
 """An effect's size as a share of the elastic force, and the spread of its logarithm."""
+_SHAPE_SPREAD = 1.0
 _OFFSET = 0.1
 _SCALE_SPREAD, _SCALE_SPREAD_GUESSED = 0.5, 3.0
 
@@ -25,7 +28,7 @@ _SCALE_SPREAD, _SCALE_SPREAD_GUESSED = 0.5, 3.0
 class Unknown:
     """One number to be found: ``value = unit * exp(theta)`` if `log`, else ``unit * theta``.
 
-    `center` and `width` describe theta beforehand: a normal law, or Student's law with `DEGREES` degrees if `heavy`.
+    `center` and `width` describe theta beforehand: a normal law, or Student's law with so many `degrees` of freedom.
     `record` is the record that it belongs to, None where all share it.
     """
 
@@ -35,7 +38,7 @@ class Unknown:
     log: bool
     center: float
     width: float
-    heavy: bool = False
+    degrees: float = math.inf
     record: int | None = None
     low: float = -math.inf
     high: float = math.inf
@@ -55,10 +58,12 @@ def natural_size(structure: Structure, path: str, nuisances: Nuisances) -> float
     masses = np.asarray(structure.mass)
     mass = float(np.mean(masses if masses.ndim == 1 else np.diag(masses)))
     force = mass * nuisances.omega**2 * nuisances.length
+    if parameter.words:  # its unit holds an exponent that is itself a parameter
+        return abs(structure.values()[path]) or 1.0
     return force**parameter.force * nuisances.length**parameter.length * nuisances.omega**-parameter.time
 
 
-def own_unknown(structure: Structure, path: str, trust: Mapping[str, float]) -> Unknown:
+def own_unknown(structure: Structure, path: str, trust: Mapping[str, float], degrees: float = DEGREES) -> Unknown:
     """A value that the model states: Student's law about it, as wide as it is trusted."""
     value = structure.values()[path]
     kind = path.split("@")[0]
@@ -69,55 +74,64 @@ def own_unknown(structure: Structure, path: str, trust: Mapping[str, float]) -> 
             f"{path} is 0 and cannot be refitted as a share of itself; state a small value, or leave the term out."
         )
     reach = _REACH.get(kind, _REACH["damping"])
-    return Unknown(path, 0.0, value, True, 0.0, math.log1p(width), heavy=True, low=-reach, high=reach)
+    return Unknown(path, 0.0, value, True, 0.0, math.log1p(width), degrees, low=-reach, high=reach)
 
 
 def free_unknown(structure: Structure, path: str, nuisances: Nuisances) -> Unknown:
     """A value to be found from the data, with a wide law about where it stands."""
-    value = structure.values()[path]
-    positive = structure.entries()[path][0].positive
-    if positive and value != 0:
-        return Unknown(path, 0.0, value, True, 0.0, 3.0)
-    scale = natural_size(structure, path, nuisances)
-    scale = max(abs(value), TYPICAL * scale)
-    return Unknown(path, value / scale, scale, False, value / scale, 10.0, low=0.0 if positive else -math.inf)
+    value, parameter = structure.values()[path], structure.entries()[path][0]
+    if parameter.positive and value != 0:
+        return bounded(Unknown(path, 0.0, value, True, 0.0, 3.0), parameter.low, parameter.high)
+    scale = max(abs(value), TYPICAL * natural_size(structure, path, nuisances))
+    low = max(parameter.low, 0.0) if parameter.positive else parameter.low
+    return bounded(Unknown(path, value / scale, scale, False, value / scale, 10.0), low, parameter.high)
 
 
 def effect_unknown(structure: Structure, path: str, nuisances: Nuisances) -> Unknown:
-    """The size of a candidate's effect: log-normal about a share of the elastic force, with the sign it has."""
-    value = structure.values()[path]
-    typical = TYPICAL * natural_size(structure, path, nuisances)
-    unit = math.copysign(typical, value)
-    unknown = Unknown(path, math.log(value / unit), unit, True, 0.0, TYPICAL_SPREAD)
-    parameter = structure.entries()[path][0]
-    ends = [end / unit for end in (parameter.low, parameter.high)]
-    return replace(unknown, high=math.log(max(ends))) if math.isfinite(max(ends)) else unknown
+    """A number of a candidate: sizes are log-normal about a share of the elastic force, shapes about where they begin.
+
+    Either keeps the sign that it has.
+    """
+    value, parameter = structure.values()[path], structure.entries()[path][0]
+    if parameter.force or path.split("@")[0] in {sensor.kind for sensor in structure.sensors}:
+        typical = TYPICAL * natural_size(structure, path, nuisances)
+        unit = math.copysign(typical, value)
+        unknown = Unknown(path, math.log(value / unit), unit, True, 0.0, TYPICAL_SPREAD)
+    elif parameter.positive:
+        unknown = Unknown(path, 0.0, value, True, 0.0, _SHAPE_SPREAD)
+    else:
+        unit = natural_size(structure, path, nuisances)
+        unknown = Unknown(path, value / unit, unit, False, 0.0, 1.0 + abs(value / unit))
+    return bounded(unknown, parameter.low, parameter.high)
 
 
 def with_offsets(structure: Structure, records: Sequence[Nuisances]) -> Structure:
     """The structure with an offset on every channel that the records measure, zero where it has none."""
     have = {sensor.at for sensor in structure.sensors if isinstance(sensor, Offset)}
     for nuisances in records:
-        for channel in _offset_channels(nuisances):
+        for channel in _offset_channels(structure, nuisances):
             if channel not in have:
                 structure, have = structure + Offset(0.0, at=channel), have | {channel}
     return structure
 
 
-def _offset_channels(nuisances: Nuisances) -> list[tuple[str, int]]:
+def _offset_channels(structure: Structure, nuisances: Nuisances) -> list[tuple[str, int]]:
     forces = [
         c
         for c in nuisances.record.channels
         if c[0] == "force" and np.any(np.asarray(nuisances.fine.force)[:, 0, c[1] - 1])
     ]
-    return [*forces, *nuisances.channels]
+    # A bias is an offset by another name, and so is a constant force beside the measured one.
+    known: set[tuple[str, int]] = {s.at for s in structure.sensors if isinstance(s, AccelerationBias)}
+    known |= {("force", t.at[1]) for t in structure.terms if isinstance(t, Preload) and t.at[0] == 0}
+    return [c for c in (*forces, *nuisances.channels) if c not in known]
 
 
 def nuisance_unknowns(structure: Structure, nuisances: Nuisances, index: int) -> list[Unknown]:
     """Offsets, initial state and noise scales of one record; `structure` carries the offsets."""
     found = []
     values = structure.values()
-    for kind, j in _offset_channels(nuisances):
+    for kind, j in _offset_channels(structure, nuisances):
         size = float(np.std(nuisances.record.channels[(kind, j)]))
         unit = _OFFSET * size
         path = f"offset@{kind}-{j}.b"
@@ -139,7 +153,9 @@ def bounded(unknown: Unknown, low: float, high: float) -> Unknown:
     """The unknown confined to values between `low` and `high`."""
     ends = []
     for end in (low, high):
-        if unknown.log:
+        if math.isinf(end):
+            ends.append(end)
+        elif unknown.log:
             share = end / unknown.unit
             ends.append(math.log(share) if share > 0 else -math.inf)
         else:

@@ -1,5 +1,6 @@
 """What was measured: records, their files, their units and their noise."""
 
+from jfsm.records._declip import declipped as declipped
 from jfsm.records._defects import clipped as clipped
 from jfsm.records._defects import spikes as spikes
 from jfsm.records._noise_floor import NoiseFloor as NoiseFloor

@@ -1,4 +1,4 @@
-"""What can be wrong on the measuring side: gains of a channel."""
+"""What can be wrong on the measuring side: gain, delay, bias and range of a channel."""
 
 import operator
 from typing import Any, ClassVar
@@ -6,9 +6,10 @@ from typing import Any, ClassVar
 import equinox as eqx
 
 from .._types import as_scalar
-from ._term import Parameter, Scalar
+from ._term import ABOVE_ZERO, Parameter, Scalar
 
 CHANNEL_KINDS = ("force", "displacement", "velocity", "acceleration")
+RESPONSES = CHANNEL_KINDS[1:]
 
 
 def as_channel(at: Any) -> tuple[str, int]:
@@ -23,11 +24,11 @@ def as_channel(at: Any) -> tuple[str, int]:
 
 
 class AbstractSensor(eqx.Module):
-    """An effect of one measuring channel."""
+    """An effect of one measuring channel; `channels` are the kinds of channel that can have it."""
 
     at: eqx.AbstractVar[tuple[str, int]]
     kind: ClassVar[str]
-    channel: ClassVar[str]
+    channels: ClassVar[tuple[str, ...]]
     parameters: ClassVar[tuple[Parameter, ...]]
 
     @property
@@ -41,11 +42,13 @@ class AbstractSensor(eqx.Module):
         return float(getattr(self, self.parameters[0].name))
 
     def __check_init__(self):
-        allowed = CHANNEL_KINDS if self.channel == "any" else (self.channel,)
-        if self.at[0] not in allowed or self.at[1] < 1:
-            raise ValueError(
-                f"`at` of {self.kind} must be ({' or '.join(allowed)}, degree of freedom from 1); got {self.at!r}."
-            )
+        if self.at[0] not in self.channels or self.at[1] < 1:
+            kinds = " or ".join(self.channels)
+            raise ValueError(f"`at` of {self.kind} must be ({kinds}, degree of freedom from 1); got {self.at!r}.")
+        parameter = self.parameters[0]
+        if self.value < parameter.least:
+            must = "be positive" if parameter.least > 0 else "not be negative"
+            raise ValueError(f"`{parameter.name}` of {self.kind} must {must}; got {self.value:g}.")
 
 
 class ForceGain(AbstractSensor):
@@ -54,7 +57,7 @@ class ForceGain(AbstractSensor):
     eps: Scalar = eqx.field(converter=as_scalar)
     at: tuple[str, int] = eqx.field(converter=as_channel, static=True, kw_only=True)
     kind = "force_gain"
-    channel = "force"
+    channels = ("force",)
     parameters = (
         Parameter("eps", positive=False, meaning="relative gain error of the force sensor", low=-0.8, high=2.0),
     )
@@ -66,10 +69,53 @@ class AccelerationGain(AbstractSensor):
     eps: Scalar = eqx.field(converter=as_scalar)
     at: tuple[str, int] = eqx.field(converter=as_channel, static=True, kw_only=True)
     kind = "accel_gain"
-    channel = "acceleration"
+    channels = ("acceleration",)
     parameters = (
         Parameter("eps", positive=False, meaning="relative gain error of the accelerometer", low=-0.8, high=2.0),
     )
+
+
+class ForceDelay(AbstractSensor):
+    """The force sensor is late: it reads the force of tau ago."""
+
+    tau: Scalar = eqx.field(converter=as_scalar)
+    at: tuple[str, int] = eqx.field(converter=as_channel, static=True, kw_only=True)
+    kind = "force_delay"
+    channels = ("force",)
+    parameters = (Parameter("tau", time=1, positive=False, meaning="delay of the force sensor"),)
+
+
+class ChannelDelay(AbstractSensor):
+    """A response channel is late: it reads the motion of tau ago."""
+
+    tau: Scalar = eqx.field(converter=as_scalar)
+    at: tuple[str, int] = eqx.field(converter=as_channel, static=True, kw_only=True)
+    kind = "channel_delay"
+    channels = RESPONSES
+    parameters = (Parameter("tau", time=1, positive=False, meaning="delay of the channel"),)
+
+
+class AccelerationBias(AbstractSensor):
+    """The accelerometer reads `b` more than there is."""
+
+    b: Scalar = eqx.field(converter=as_scalar)
+    at: tuple[str, int] = eqx.field(converter=as_channel, static=True, kw_only=True)
+    kind = "accel_bias"
+    channels = ("acceleration",)
+    parameters = (Parameter("b", positive=False, meaning="bias of the accelerometer, in its unit"),)
+
+
+class Clipping(AbstractSensor):
+    """The channel shows nothing beyond ±limit.
+
+    The motion is not changed by it; of a clipped force the lost arcs are reconstructed before it drives anything.
+    """
+
+    limit: Scalar = eqx.field(converter=as_scalar)
+    at: tuple[str, int] = eqx.field(converter=as_channel, static=True, kw_only=True)
+    kind = "clipping"
+    channels = CHANNEL_KINDS
+    parameters = (Parameter("limit", meaning="largest reading, in the channel's unit", least=ABOVE_ZERO, free=False),)
 
 
 class Offset(AbstractSensor):
@@ -78,8 +124,8 @@ class Offset(AbstractSensor):
     b: Scalar = eqx.field(converter=as_scalar)
     at: tuple[str, int] = eqx.field(converter=as_channel, static=True, kw_only=True)
     kind = "offset"
-    channel = "any"
+    channels = CHANNEL_KINDS
     parameters = (Parameter("b", positive=False, meaning="offset of the channel, in its unit"),)
 
 
-SENSORS = (ForceGain, AccelerationGain, Offset)
+SENSORS = (ForceGain, AccelerationGain, ForceDelay, ChannelDelay, AccelerationBias, Clipping, Offset)

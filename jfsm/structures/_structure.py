@@ -91,6 +91,69 @@ class Structure(eqx.Module):
         terms = [LinearStiffness(k, at=at) for k, at in zip(springs, links, strict=True)]
         return cls(masses, [*terms, *(LinearDamping(c, at=at) for c, at in zip(dashpots, links, strict=True))])
 
+    @classmethod
+    def from_matrices(cls, mass: Any, stiffness: Any, damping: Any = None) -> "Structure":
+        """Structure of a mass, a stiffness and a damping matrix, each (dof, dof).
+
+        A spring or dashpot joins every two degrees of freedom that the matrix couples, and ground where a row's sum
+        is not zero, so that each can be refitted, or replaced, by itself.
+
+        Raises
+        ------
+        ValueError
+            If a matrix is not square and symmetric, or they differ in size.
+        """
+        masses = as_array(mass, "mass", 2)
+        terms: list[AbstractTerm] = []
+        for name, law, values in (("stiffness", LinearStiffness, stiffness), ("damping", LinearDamping, damping)):
+            if values is None:
+                continue
+            matrix = as_array(values, name, 2)
+            if matrix.shape != masses.shape or not np.allclose(matrix, matrix.T):
+                raise ValueError(
+                    f"`{name}` must be symmetric and of the size of `mass` {masses.shape}; got shape {matrix.shape}."
+                )
+            nothing = 1e-12 * np.max(np.abs(matrix), initial=0.0)
+            for i in range(len(matrix)):
+                couplings = [((0, i + 1), float(np.sum(matrix[i])))]
+                couplings += [((i + 1, j + 1), -float(matrix[i, j])) for j in range(i + 1, len(matrix))]
+                terms += [law(value, at=at) for at, value in couplings if abs(value) > nothing]
+        diagonal = np.diag(masses)
+        return cls(diagonal if np.array_equal(np.diag(diagonal), masses) else masses, terms)
+
+    @classmethod
+    def from_modes(cls, frequencies: Any, damping_ratios: Any, shapes: Any, modal_masses: Any = None) -> "Structure":
+        """Structure of as many modes as degrees of freedom.
+
+        Parameters
+        ----------
+        frequencies, damping_ratios : (dof,) arrays
+            Undamped natural frequencies [Hz] and damping ratios.
+        shapes : (dof, dof) array
+            One mode per column.
+        modal_masses : (dof,) array, optional
+            [kg]; 1 for mass-normalised shapes, the default.
+
+        Raises
+        ------
+        ValueError
+            If the numbers of modes differ, or the shapes are not independent.
+        """
+        shape = as_array(shapes, "shapes", 2)
+        omega = 2 * np.pi * as_array(frequencies, "frequencies", 1)
+        ratios = as_array(damping_ratios, "damping_ratios", 1)
+        masses = np.ones_like(omega) if modal_masses is None else as_array(modal_masses, "modal_masses", 1)
+        for name, values in (("damping_ratios", ratios), ("shapes", shape), ("modal_masses", masses)):
+            if any(size != omega.size for size in values.shape):
+                raise ValueError(f"`{name}` must have {omega.size} modes, as `frequencies` has; got {values.shape}.")
+        if np.linalg.matrix_rank(shape) < omega.size:
+            raise ValueError("`shapes` must hold independent columns, one per mode; theirs are not.")
+        inverse = np.linalg.inv(shape)  # M = Φ⁻ᵀ diag(m) Φ⁻¹, and so the others
+        mass, stiffness, damping = (
+            inverse.T @ np.diag(values) @ inverse for values in (masses, masses * omega**2, 2 * masses * ratios * omega)
+        )
+        return cls.from_matrices((mass + mass.T) / 2, (stiffness + stiffness.T) / 2, (damping + damping.T) / 2)
+
     @property
     def dof(self) -> int:
         """Number of degrees of freedom."""

@@ -7,16 +7,23 @@ from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 Scalar = Float[Array, ""]
 
 
+ABOVE_ZERO = 1e-300
+"""`Parameter.least` of a number that a law divides by."""
+
+
 class Parameter(NamedTuple):
     """One number of a law.
 
-    `force`, `length` and `time` are the exponents of its unit: N/m³ is ``force=1, length=-3``. A fit keeps it between
-    `low` and `high`.
+    `force`, `length` and `time` are the exponents of its unit: N/m³ is ``force=1, length=-3``; `words` is the unit as a
+    template where an exponent is itself a parameter. A fit keeps the number between `low` and `high`, in logarithms if
+    it is `positive`, and leaves it alone if it is not `free` (a side, an origin of time). A value below `least` is
+    refused.
     """
 
     name: str
@@ -27,9 +34,14 @@ class Parameter(NamedTuple):
     meaning: str = ""
     low: float = -math.inf
     high: float = math.inf
+    least: float = -math.inf
+    free: bool = True
+    words: str = ""
 
     def unit(self, force: str = "N", length: str = "m", time: str = "s") -> str:
         """The unit in words, ``"N/m^3"``, from the record's unit of force and of length."""
+        if self.words:
+            return self.words.format(force=force, length=length, time=time)
         if (self.force, self.length, self.time, force, length, time) == (1, -1, 2, "N", "m", "s"):
             return "kg"
         powers = [(force, self.force), (length, self.length), (time, self.time)]
@@ -52,20 +64,96 @@ def as_link(at: Any) -> tuple[int, int]:
     return i, j
 
 
+class Scale(NamedTuple):
+    """Sizes of a motion, which a law's numbers are natural to.
+
+    `force` is the rms of the elastic force, `length` the rms of the displacement, `peak` its largest value, `omega` the
+    angular frequency [rad/s], `begin` and `end` the record's first and last instant.
+    """
+
+    force: float
+    length: float
+    peak: float
+    omega: float
+    begin: float
+    end: float
+
+    def of(self, parameter: Parameter) -> float:
+        """Natural size of a number by its unit."""
+        return self.force**parameter.force * self.length**parameter.length * self.omega**-parameter.time
+
+    @property
+    def speed(self) -> float:
+        return self.length * self.omega
+
+    def instants(self, count: int) -> list[float]:
+        """So many instants inside the record, evenly spread."""
+        return [self.begin + (i + 1) / (count + 1) * (self.end - self.begin) for i in range(count)]
+
+
+Numbers = dict[str, float]
+
+
 class AbstractTerm(eqx.Module):
     """A force on the link ``at=(i, j)``, restoring side positive: it resists d = x_j - x_i and w = v_j - v_i.
 
-    A concrete term lists its numbers as fields, in the order of `parameters`, and then `at`.
+    A concrete term lists its numbers as fields, in the order of `parameters`, and then `at`. One with a memory says how
+    many hidden `states` it has, and gives `state_rate` and, where they do not begin at zero, `initial_state`; where a
+    hidden state is confined, `settle` puts it back at the end of a step. One that acts on the past gives `delay`.
     """
 
     at: eqx.AbstractVar[tuple[int, int]]
     kind: ClassVar[str]
     """First part of the path of its parameters, ``coulomb`` in ``coulomb@0-1.F``."""
     parameters: ClassVar[tuple[Parameter, ...]]
+    states: ClassVar[int] = 0
+    base: ClassVar[tuple[float, ...]] = ()
+    """Share of the base's acceleration that each hidden state loses: 1 for the velocity of a mass of its own."""
+
+    def __check_init__(self):
+        for parameter in self.parameters:
+            value = getattr(self, parameter.name)
+            if isinstance(value, Tracer) or float(value) >= parameter.least:
+                continue  # a traced value cannot be looked at; a fit keeps it within its bounds
+            must = "be positive" if parameter.least > 0 else "not be negative"
+            raise ValueError(f"`{parameter.name}` of {self.kind} must {must}; got {float(value):g}.")
 
     @abc.abstractmethod
     def force(self, d: Scalar, w: Scalar, z: Any, t: Scalar) -> Scalar:
-        """Force of the term [N] at relative displacement `d`, relative velocity `w`, memory `z` and time `t`."""
+        """Force of the term [N] at relative displacement `d`, relative velocity `w`, memory `z` and time `t`.
+
+        A term with a `delay` is given `d` and `w` as they were that long ago.
+        """
+
+    def state_rate(self, d: Scalar, w: Scalar, z: Any, t: Scalar) -> Any:
+        """Rate of the hidden states (states,)."""
+        return jnp.zeros(self.states)
+
+    def initial_state(self, d: Scalar, w: Scalar) -> Any:
+        """Hidden states (states,) at rest with the link at `d`, `w`: relaxed."""
+        return jnp.zeros(self.states)
+
+    def settle(self, d: Scalar, z: Any) -> Any:
+        """Hidden states within their bounds."""
+        return z
+
+    @property
+    def delay(self) -> Scalar | None:
+        """How long ago [s] the motion was that the force answers; None for the present."""
+        return None
+
+    @property
+    def breakpoints(self) -> tuple[Scalar, ...]:
+        """Instants [s] at which the law jumps."""
+        return ()
+
+    @classmethod
+    def shapes(cls, scale: Scale) -> list[Numbers]:
+        """Sets of numbers to begin a search from, each with a force of the elastic one's size.
+
+        All numbers whose unit holds a force scale together, so a search has to find one factor for each set.
+        """
+        return [{p.name: scale.of(p) for p in cls.parameters}]
 
     @property
     def place(self) -> str:

@@ -5,5 +5,6 @@ that an error made in the library cannot be made in its examination as well.
 """
 
 from .challenge import CAUSES as CAUSES
+from .challenge import FIRST_CAUSES as FIRST_CAUSES
 from .challenge import Challenge as Challenge
 from .challenge import draw as draw

@@ -2,18 +2,23 @@
 
 import dataclasses
 from collections.abc import Collection, Sequence
+from typing import Any
 
 import numpy as np
 
+from .arrays import FloatArray, rms
 from .beliefs import WRONG_VALUES, roughly_known, wrong_value
 from .drives import DRIVES, Drive
 from .exact import integrate
-from .laws import LAWS, Law, NoLaw
-from .laws.base import FloatArray, rms
-from .plants import EscapeError, Motion, Plant, State, sketch
-from .sensors import GAINS, UNITS, Channels, Gain, with_noise
+from .laws import FIRST_LAWS, LAWS, Law, NoLaw, Scene
+from .plants import EscapeError, Motion, Plant, State
+from .sensors import DELAYS, FIRST_SENSORS, SENSORS, UNITS, Channels, Sensor, with_noise
+from .sketch import sketch
 
-CAUSES = ("none", *LAWS, *GAINS, *WRONG_VALUES)
+CAUSES = ("none", *LAWS, *SENSORS, *WRONG_VALUES)
+# Nothing, seven hidden effects and the wrong values. A seed draws among the causes that it is asked for, so what it
+# draws from these does not change as the catalogue grows.
+FIRST_CAUSES = ("none", *FIRST_LAWS, *FIRST_SENSORS, *WRONG_VALUES)
 CHANNEL_SETS = {
     "xva": ("displacement", "velocity", "acceleration"),
     "x": ("displacement",),
@@ -21,9 +26,15 @@ CHANNEL_SETS = {
 }
 NOISE_LEVELS = (0.001, 0.01, 0.02, 0.05)
 SAMPLES = 3000
-SMALLEST_SHARE, LARGEST_SHARE = 0.03, 0.5
 # Below this share of the link's force no other k and c would have to be believed wrong.
 LEAST_LEFT = 0.015
+# How many times the peak of the motion without the law a motion may reach: beyond it the plant is another one.
+FARTHEST = 10.0
+# How many times a small shift of the start, as a share of the motion's rms, may grow where motions may part
+# exponentially: the exact motion, good to 1e-10 a step, then is exact still.
+SMALL_SHIFT, LARGEST_PARTING = 1e-6, 1e3
+# Told from a sensor's offset only by the swing with which it sets in.
+NEEDS_REST = ("preload",)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,13 +43,14 @@ class Challenge:
 
     `channels` is what the tool is given and `clean` the same before noise, both by kind, (n,) each; `model` is what the
     owner believes and `truth` the plant. `share` is the rms of the effect over that of k x + c v, and `left` what of it
-    no other k and c take up; both are 0 where no law is hidden. `motion` is the exact motion, sensors apart.
+    no other k and c take up; both are 0 where no law is hidden. `motion` is the exact motion, sensors apart. Among the
+    parameters, `side` is an integer and `channel` the place of a sensor, as ("displacement", 1); all others are floats.
     """
 
     seed: int
     cause: str
     at: tuple[int | str, ...]
-    parameters: dict[str, float]
+    parameters: dict[str, Any]
     time: FloatArray
     channels: Channels
     clean: Channels
@@ -104,33 +116,73 @@ def draw(
     plant, drive, start, law, motion = _fair_question(physics, cause, excitation)
     share, left = motion.shares(plant)
     kinds = (() if excitation == "free_decay" else ("force",)) + CHANNEL_SETS[channel_set]
+    at: tuple[int | str, ...] = ()
+    parameters: dict[str, Any] = {}
+    model = plant
+    clean = _channels(drive, motion, kinds)
+    readings: Channels = {}
+    if cause in WRONG_VALUES:
+        field, name, at = WRONG_VALUES[cause]
+        model, parameters = wrong_value(physics, plant, field), {name: getattr(plant, field)}
+    elif cause != "none":
+        model = roughly_known(physics, plant)
+        if cause in SENSORS:
+            kind, places = SENSORS[cause]
+            sensor = kind.draw(physics, clean, [k for k in kinds if k in places], float(motion.time[1]))
+            at, parameters = sensor.at, sensor.parameters
+            motion, earlier = _with_earlier(sensor, plant, drive, start, motion)
+            if sensor.early:
+                start = (float(motion.x[0]), float(motion.v[0]))
+            truth = _channels(drive, motion, kinds)
+            clean = sensor.shown(truth, earlier)
+            if sensor.after_noise:
+                readings = sensor.shown(with_noise(static, truth, level), earlier)
+        else:
+            at, parameters = law.at, dataclasses.asdict(law)
+    return Challenge(
+        seed=seed, cause=cause, at=at, parameters=parameters, time=motion.time,
+        channels=readings or with_noise(static, clean, level), clean=clean,
+        units={kind: UNITS[kind] for kind in kinds}, model=model, truth=plant, noise=level, channel_set=channel_set,
+        excitation=excitation,
+        at_rest=start == (0.0, 0.0) and (bool(choice.random() < 0.5) or cause in NEEDS_REST),
+        share=share, left=left, law=law, drive=drive, start=start, motion=motion,
+    )  # fmt: skip
+
+
+def _channels(drive: Drive, motion: Motion, kinds: Sequence[str]) -> Channels:
+    """What perfect sensors of these kinds would show, (n,) each."""
     everything = {
         "force": drive(motion.time),
         "displacement": motion.x,
         "velocity": motion.v,
         "acceleration": motion.acceleration,
     }
-    clean = {kind: everything[kind] for kind in kinds}
-    at: tuple[int | str, ...] = ()
-    parameters: dict[str, float] = {}
-    model = plant
-    if cause in WRONG_VALUES:
-        field, name, at = WRONG_VALUES[cause]
-        model, parameters = wrong_value(physics, plant, field), {name: getattr(plant, field)}
-    elif cause != "none":
-        model = roughly_known(physics, plant)
-        if cause in GAINS:
-            gain = Gain.draw(physics, GAINS[cause])
-            clean, at, parameters = gain.shown(clean), gain.at, {"eps": gain.eps}
-        else:
-            at, parameters = law.at, dataclasses.asdict(law)
-    return Challenge(
-        seed=seed, cause=cause, at=at, parameters=parameters, time=motion.time,
-        channels=with_noise(static, clean, level), clean=clean, units={kind: UNITS[kind] for kind in kinds},
-        model=model, truth=plant, noise=level, channel_set=channel_set, excitation=excitation,
-        at_rest=start == (0.0, 0.0) and bool(choice.random() < 0.5),
-        share=share, left=left, law=law, drive=drive, start=start, motion=motion,
-    )  # fmt: skip
+    return {kind: everything[kind] for kind in kinds}
+
+
+def _with_earlier(sensor: Sensor, plant: Plant, drive: Drive, start: State, motion: Motion) -> tuple[Motion, Any]:
+    """The motion and a function that gives any channel some time before each sample.
+
+    For a sensor that is late the plant is started before the record begins, so that there is a motion to be late with.
+    """
+    time = motion.time
+    if not sensor.early:
+        return motion, None
+    step, tau = float(time[1]), sensor.parameters["tau"]
+    begin = -np.ceil(max(DELAYS)) * step
+    every = np.unique(np.concatenate([[begin], time - tau, time]))
+    longer = integrate(plant, NoLaw(), drive, start, every, rms(motion.x))
+
+    def at(instants: FloatArray) -> Motion:
+        i = np.searchsorted(every, instants)
+        return Motion(instants, longer.x[i], longer.v[i], longer.acceleration[i], longer.effect[i], np.empty(0))
+
+    late = at(time - tau)
+
+    def earlier(kind: str, tau: float) -> FloatArray:
+        return _channels(drive, late, (kind,))[kind]
+
+    return at(time), earlier
 
 
 def _named(argument: str, given: str | Sequence[str], known: Collection[str]) -> tuple[str, ...]:
@@ -145,14 +197,31 @@ def _can_tell(cause: str, channel_set: str, excitation: str) -> bool:
     """Whether the record of a linear plant can show this cause and no other in its place.
 
     With acceleration alone the gains of force and accelerometer are one and the same. Without a force channel a plant
-    is known up to one scale: the mass cannot be wrong by itself, nor a force sensor that is not there.
+    is known up to one scale: the mass cannot be wrong by itself, nor a force sensor that is not there. A single
+    response channel that is late is a shifted clock where nothing else tells the time, and under one line the phase of
+    another damping. So is a late force, and a law that is linear but for its memory. A change with time is a change
+    with amplitude in a single decay. A preload is an offset, but for the swing with which it sets in on a plant that is
+    known to be at rest.
     """
+    decays, one_line = excitation == "free_decay", excitation == "harmonic"
     if cause == "force_gain":
-        return excitation != "free_decay" and channel_set != "a"
+        return not decays and channel_set != "a"
     if cause == "accel_gain":
         return channel_set == "xva"
+    if cause == "accel_bias":
+        return channel_set != "x"
     if cause == "mass_value":
-        return excitation != "free_decay"
+        return not decays
+    if cause == "channel_delay":
+        return channel_set == "xva" or not (decays or one_line)
+    if cause in ("force_delay", "maxwell", "delayed_force"):
+        return not (decays or one_line)
+    if cause == "attached_oscillator":
+        return not one_line
+    if cause in ("stiffness_drift", "stiffness_drop", "damping_drift", "parametric_stiffness"):
+        return not decays
+    if cause == "preload":
+        return not decays and channel_set != "a"
     return True
 
 
@@ -161,24 +230,41 @@ def _fair_question(rng: np.random.Generator, cause: str, excitation: str) -> tup
     for _ in range(50):
         plant, time = _draw_plant(rng)
         drive, start, plain = _draw_motion(rng, plant, excitation, time)
-        scale = rms(plain.x)
+        scale, limit = rms(plain.x), FARTHEST * plain.peak
         if cause not in LAWS:
             return plant, drive, start, NoLaw(), integrate(plant, NoLaw(), drive, start, time, scale)
+        if cause in NEEDS_REST:
+            start = (0.0, 0.0)
         for _ in range(20):
-            share = float(np.exp(rng.uniform(np.log(SMALLEST_SHARE), np.log(LARGEST_SHARE))))
             try:
-                law = _sized(rng, LAWS[cause], plant, drive, start, plain, share)
-                motion = integrate(plant, law, drive, start, time, scale)
+                law = _sized(rng, LAWS[cause], Scene(plant, drive, plain), start, limit)
+                begin = law.start(*start, plant.stiffness)
+                aside = (begin[0] + SMALL_SHIFT * scale, begin[1])
+                if law.chaotic:
+                    here, there = (sketch(plant, law, drive, state, time, limit) for state in (begin, aside))
+                    if _parted(here, there, scale):
+                        continue
+                motion = integrate(plant, law, drive, begin, time, scale, limit=limit)
+                if law.chaotic and _parted(
+                    motion, integrate(plant, law, drive, aside, time, scale, 1e-8, limit), scale
+                ):
+                    continue
             except EscapeError:
                 continue
-            if _is_fair(plant, motion):
-                return plant, drive, start, law, motion
+            if _is_fair(law, Scene(plant, drive, motion)):
+                return plant, drive, begin, law, motion
     raise RuntimeError(f"no fair {cause} under {excitation} in 50 plants; its law's draw must be made to suit it.")
 
 
-def _is_fair(plant: Plant, motion: Motion) -> bool:
-    share, left = motion.shares(plant)
-    return SMALLEST_SHARE <= share <= LARGEST_SHARE and left >= LEAST_LEFT
+def _is_fair(law: Law, scene: Scene) -> bool:
+    share, left = scene.motion.shares(scene.plant)
+    smallest, largest = law.shares
+    return smallest <= share <= largest and left >= LEAST_LEFT and law.fits(scene)
+
+
+def _parted(one: Motion, other: Motion, scale: float) -> bool:
+    """Whether two motions from starts a small shift apart have gone so far apart that neither can be trusted."""
+    return float(np.abs(one.x - other.x).max()) > LARGEST_PARTING * SMALL_SHIFT * scale
 
 
 def _draw_plant(rng: np.random.Generator) -> tuple[Plant, FloatArray]:
@@ -205,22 +291,27 @@ def _draw_motion(
     return drive, start, sketch(plant, NoLaw(), drive, start, time)
 
 
-def _sized(
-    rng: np.random.Generator, kind: type[Law], plant: Plant, drive: Drive, start: State, plain: Motion, share: float
-) -> Law:
-    """A law whose effect has about this share of the link's force along the motion that it changes itself.
+def _sized(rng: np.random.Generator, kind: type[Law], scene: Scene, start: State, limit: float) -> Law:
+    """A law whose effect has a drawn share of the link's force along the motion that it changes itself.
+
+    `scene` holds the motion without it, whose scales are natural to the law.
 
     Raises
     ------
     EscapeError
         If there is no such law within its reach, or if too little of it would be left.
     """
+    plant, plain = scene.plant, scene.motion
+    share = float(np.exp(rng.uniform(*np.log(kind.shares))))
     link = rms(plant.stiffness * plain.x + plant.damping * plain.v)
-    law = kind.draw(rng, plain.x, plain.v, share * link)
+    law = kind.draw(rng, scene, share * link)
+    if not kind.sized:
+        return law
     for _ in range(4):
-        found, left = sketch(plant, law, drive, start, plain.time).shares(plant)
+        motion = sketch(plant, law, scene.drive, start, plain.time, limit)
+        found, left = motion.shares(plant)
         if abs(np.log(found / share)) < 0.1:
-            if left < 0.9 * LEAST_LEFT:
+            if left < 0.9 * LEAST_LEFT or not law.fits(Scene(plant, scene.drive, motion)):
                 break
             return law
         law = law.scaled(float(np.clip((share / found) ** 0.8, 0.3, 3.0)))

@@ -6,7 +6,7 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
-from .laws.base import FloatArray
+from .arrays import FloatArray
 
 
 class Drive(Protocol):

@@ -1,22 +1,28 @@
 """The exact motion of a plant: each mode of its law integrated by DOP853 up to its located end."""
 
+import bisect
 import dataclasses
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
+from scipy.integrate import DOP853
+from scipy.optimize import brentq, minimize_scalar
 
+from .arrays import FloatArray
 from .drives import Drive
-from .laws.base import FloatArray, Law
+from .laws import Law
+from .laws.base import Hidden, Mode
 from .plants import EscapeError, Motion, Plant, State
 
 RELATIVE_TOLERANCE = 1e-10
-# A guard counts as zero at minus this share of the typical velocity: no mode ends at the instant at which it begins.
-GUARD_SLACK = 1e-13
 # How often per sample a held mass is looked at. Two crossings between looks go unseen; the slip would be below 1e-9.
 WATCHES_PER_SAMPLE = 20
+# How often a guard is looked at within a step, whose ends alone would not show that it was negative for a while.
+LOOKS_PER_STEP = 8
 # More modes than this between two samples are no motion but a law whose modes follow one another without end.
 MODES_PER_SAMPLE = 100
+EPS = float(np.finfo(float).eps)
 
 
 def integrate(
@@ -27,6 +33,7 @@ def integrate(
     time: FloatArray,
     scale: float,
     rtol: float = RELATIVE_TOLERANCE,
+    limit: float = np.inf,
 ) -> Motion:
     """The motion of m x'' + c x' + k x + law = g from `start` on `time` (n,) [s].
 
@@ -35,112 +42,240 @@ def integrate(
     Raises
     ------
     EscapeError
-        If abs(x) passes the law's reach, or the motion cannot be continued.
+        If abs(x) passes the law's reach or `limit` [m], or the motion cannot be continued.
     RuntimeError
-        If the law changes its mode on and on without getting to the next sample.
+        If the law changes its mode on and on without getting to the next sample, and is not one that creeps.
     """
-    run = _Run(plant, law, drive, scale, rtol, watch=float(time[1] - time[0]) / WATCHES_PER_SAMPLE)
-    x, v, effect = np.empty((3, time.size))
-    here, state, instants = float(time[0]), start, []
-    mode = law.first_mode(start[1], float(run.load(here, *start)))
+    run = _Run(plant, law, drive, start, time, scale, rtol, min(law.reach(plant.stiffness), limit))
+    here, state = float(time[0]), np.array([*start, *law.hidden_start(*start)])
+    stops = [*law.stops(here, float(time[-1])).tolist(), float(time[-1])]
+    mode = law.first_mode(*start, run.remembered(here, state), here, float(run.load(here, *start)))
+    pieces, instants = [], []
     done = modes = 0
     while done < time.size:
-        phase = run.held(here, state, time[done:]) if law.holds(mode) else run.moving(mode, here, state, time[done:])
-        piece = slice(done, done + phase.x.size)
-        x[piece], v[piece] = phase.x, phase.v
-        effect[piece] = law.force(phase.x, phase.v, run.load(time[piece], phase.x, phase.v), mode)
-        here, state, done = phase.end, phase.state, piece.stop
-        modes = 0 if phase.x.size else modes + 1
+        until = stops[bisect.bisect_right(stops, here, hi=len(stops) - 1)]
+        if law.holds(mode):
+            phase = run.held(here, state, time[done:])
+        else:
+            phase = run.moving(mode, here, until, state, time[done:])
+        piece = time[done : done + phase.y.shape[1]]
+        x, v = phase.y[:2]
+        z = run.remembered(piece, phase.y)
+        pieces.append((x, v, np.broadcast_to(law.force(x, v, z, piece, run.load(piece, x, v), mode), x.shape), *z))
+        here, state, done = phase.end, phase.state, done + piece.size
+        modes = 0 if piece.size else modes + 1
         if modes > MODES_PER_SAMPLE:
+            if law.creeps:
+                raise EscapeError(f"the mass creeps near rest at {here} s, where the law is too stiff to be followed")
             raise RuntimeError(
                 f"a law's modes must let the motion go on; those of {type(law).__name__} followed one another "
                 f"{modes} times at {here} s. Mend its next_mode."
             )
         if done < time.size:
-            instants.append(here)
-            mode = law.next_mode(mode, float(run.load(here, *state)))
-    return Motion(time, x, v, (run.load(time, x, v) - effect) / plant.mass, effect, np.array(instants))
+            if phase.exit is None:
+                following = law.mode_after_stop(mode)
+            else:
+                following = law.next_mode(mode, phase.exit, float(run.load(here, *state[:2])))
+            if phase.exit is not None or following != mode:
+                instants.append(here)
+            mode = following
+    x, v, effect, *hidden = map(np.concatenate, zip(*pieces, strict=True))
+    acceleration = (run.load(time, x, v) - effect) / plant.mass
+    return Motion(time, x, v, acceleration, effect, np.array(instants), tuple(hidden))
 
 
 @dataclasses.dataclass(frozen=True)
 class _Phase:
-    """One mode: its samples (n,), n may be 0; the instant [s] and the state at its end."""
+    """One mode: its samples (states, n), n may be 0; the instant [s] and the state (states,) at its end.
 
-    x: FloatArray
-    v: FloatArray
+    `exit` is the number of the guard that ended it, -1 where a held mass was let go, None where it came to a stop.
+    """
+
+    y: FloatArray
     end: float
-    state: State
+    state: FloatArray
+    exit: int | None
 
 
-@dataclasses.dataclass(frozen=True)
+class _Past:
+    """x [m] at any time up to the end of the last finished step; before the start, the starting value."""
+
+    def __init__(self, begin: float, x: float):
+        self.begin, self.x = begin, x
+        self.ends: list[float] = []
+        self.steps: list[Callable[[Any], FloatArray]] = []
+
+    def append(self, end: float, step: Callable[[Any], FloatArray]) -> None:
+        self.ends.append(end)
+        self.steps.append(step)
+
+    def __call__(self, t: float) -> float:
+        if t <= self.begin:
+            return self.x
+        # Beyond the last end by rounding only.
+        return float(self.steps[min(bisect.bisect_left(self.ends, t), len(self.ends) - 1)](t)[0])
+
+
 class _Run:
-    plant: Plant
-    law: Law
-    drive: Drive
-    scale: float
-    rtol: float
-    watch: float
+    def __init__(
+        self, plant: Plant, law: Law, drive: Drive, start: State, time: FloatArray, scale: float, rtol: float,
+        reach: float,
+    ):  # fmt: skip
+        self.plant, self.law, self.drive, self.rtol, self.reach = plant, law, drive, rtol, reach
+        self.watch = float(time[1] - time[0]) / WATCHES_PER_SAMPLE
+        sizes = {"displacement": scale, "velocity": plant.omega * scale}
+        self.sizes = sizes
+        self.atol = rtol * np.array([sizes[kind] for kind in ("displacement", "velocity", *law.hidden)])
+        self.past = _Past(float(time[0]), start[0])
+        self.longest = 0.0
 
     def load(self, t, x, v):
         return self.drive(t) - self.plant.damping * v - self.plant.stiffness * x
 
-    def moving(self, mode: int, here: float, state: State, time: FloatArray) -> _Phase:
-        m, k, c, drive, force = self.plant.mass, self.plant.stiffness, self.plant.damping, self.drive, self.law.force
-        speed, reach = self.plant.omega * self.scale, self.law.reach(self.plant.stiffness)
+    def remembered(self, t: Any, y: FloatArray) -> Hidden:
+        """What the law remembers at t, in the states y (states,) or along (states, n)."""
+        if not self.law.delay:
+            return tuple(y[2:])
+        return (np.array([self.past(s) for s in np.ravel(t - self.law.delay).tolist()]).reshape(np.shape(t)),)
 
-        def rates(t: float, y: FloatArray) -> State:
+    def _rates(self, mode: Mode) -> Callable[[float, FloatArray], Sequence[float]]:
+        """Right-hand side within a mode."""
+        m, k, c = self.plant.mass, self.plant.stiffness, self.plant.damping
+        drive, force, hidden_rates = self.drive, self.law.force, self.law.hidden_rates
+        past, delay = self.past, self.law.delay
+
+        def rates(t: float, y: FloatArray) -> Sequence[float]:
             x, v = y.tolist()
             load = float(drive(t)) - c * v - k * x
-            return v, (load - force(x, v, load, mode)) / m
+            return v, (load - force(x, v, (), t, load, mode)) / m
 
-        def ends(t: float, y: FloatArray) -> float:
+        def with_memory(t: float, y: FloatArray) -> Sequence[float]:
+            x, v, *z = y.tolist()
+            load = float(drive(t)) - c * v - k * x
+            return v, (load - force(x, v, z, t, load, mode)) / m, *hidden_rates(x, v, z, mode)
+
+        def with_delay(t: float, y: FloatArray) -> Sequence[float]:
             x, v = y.tolist()
-            return self.law.guard(mode, x, v) + GUARD_SLACK * speed
+            load = float(drive(t)) - c * v - k * x
+            return v, (load - force(x, v, (past(t - delay),), t, load, mode)) / m
 
-        def escapes(t: float, y: FloatArray) -> float:
-            return reach - abs(float(y[0]))
+        return with_delay if delay else with_memory if self.law.hidden else rates
 
-        events = [event for event, wanted in ((ends, not self.law.smooth), (escapes, np.isfinite(reach))) if wanted]
-        for event in events:
-            event.terminal, event.direction = True, -1.0  # pyright: ignore[reportFunctionMemberAccess]
-        solution = solve_ivp(
-            rates,
-            (here, float(time[-1])),
-            np.array(state),
-            method="DOP853",
-            t_eval=time,
-            events=events or None,
-            rtol=self.rtol,
-            atol=self.rtol * np.array([self.scale, speed]),
-        )
-        if solution.status < 0:
-            raise EscapeError(f"the motion cannot be continued: {solution.message}")
-        x, v = solution.y if len(solution.t) else np.empty((2, 0))
-        if solution.status == 0:
-            return _Phase(x, v, float(time[-1]), (float(x[-1]), float(v[-1])))
-        which = next(i for i, instants in enumerate(solution.t_events) if instants.size)
-        if events[which] is escapes:
-            raise EscapeError("the motion passes the law's reach")
-        x_end, v_end = solution.y_events[which][0].tolist()
-        return _Phase(x, v, float(solution.t_events[which][0]), (x_end, v_end))
+    def _guards(self, mode: Mode, y: Any) -> list[Any]:
+        """Guards of a mode, each raised by its slack, at y (states,) or along (states, n)."""
+        x, v, *z = y
+        speeds = self.law.velocity_guards(mode, x, v, z)
+        lengths = self.law.displacement_guards(mode, x, v, z)
+        if not speeds and not lengths:
+            raise NotImplementedError(f"{type(self.law).__name__} is not smooth and must say where its modes end")
+        speed, length = (self.law.slack * self.sizes[kind] for kind in ("velocity", "displacement"))
+        return [guard + speed for guard in speeds] + [guard + length for guard in lengths]
 
-    def held(self, here: float, state: State, time: FloatArray) -> _Phase:
-        x, last = state[0], float(time[-1])
+    def moving(self, mode: Mode, here: float, until: float, state: FloatArray, time: FloatArray) -> _Phase:
+        watched = not self.law.smooth
+        before = self._guards(mode, state.tolist()) if watched else []
+        solver = DOP853(
+            self._rates(mode), here, state, until, rtol=self.rtol, atol=self.atol,  # pyright: ignore[reportArgumentType]
+            # A delay's pieces are many and short: each goes on with the steps of the one before.
+            first_step=min(self.longest, until - here) if self.law.delay and self.longest else None,
+        )  # fmt: skip
+        self.longest = 0.0
+        samples, done = [], 0
+        while solver.status == "running":
+            message = solver.step()
+            if solver.status == "failed":
+                raise EscapeError(f"the motion cannot be continued: {message}")
+            if not abs(solver.y[0]) <= self.reach:
+                raise EscapeError("the motion passes the law's reach")
+            begin, end = float(solver.t_old), float(solver.t)  # pyright: ignore[reportArgumentType]
+            self.longest = max(self.longest, end - begin)
+            step = solver.dense_output()
+            crossing = None
+            if watched:
+                after = self._guards(mode, solver.y.tolist())
+                crossing = self._crossing(mode, step, begin, end, before, after)
+                before = after
+            if self.law.delay:
+                self.past.append(end, step)
+            if crossing:
+                end = crossing[0]
+            passed = int(np.searchsorted(time, end, side="right"))
+            if passed > done:
+                samples.append(step(time[done:passed]))
+                done = passed
+            if crossing:
+                return _Phase(_joined(samples, state.size), end, step(end), crossing[1])
+        return _Phase(_joined(samples, state.size), until, solver.y, None)
+
+    def _crossing(
+        self, mode: Mode, step: Callable[[Any], FloatArray], begin: float, end: float,
+        before: Sequence[float], after: Sequence[float],
+    ) -> tuple[float, int] | None:  # fmt: skip
+        """The first instant within a step at which a guard comes to zero, and which guard."""
+        grid = np.linspace(begin, end, LOOKS_PER_STEP + 1)
+        values = np.array([np.broadcast_to(guard, grid.shape) for guard in self._guards(mode, step(grid))])
+        values[:, 0], values[:, -1] = before, after
+        crossings = []
+        for which, y in enumerate(values):
+
+            def guard(t: float, which: int = which) -> float:
+                return self._guards(mode, step(t).tolist())[which]
+
+            if y[0] < 0.0:  # by the rounding of the instant at which the mode began; if it goes on falling, it is over
+                if y[-1] < 10.0 * y[0]:
+                    crossings.append((begin, which))
+                continue
+            bracket = _bracket(guard, grid, y)
+            if bracket:
+                root = brentq(guard, *bracket, xtol=4.0 * EPS, rtol=4.0 * EPS)  # pyright: ignore[reportArgumentType]
+                crossings.append((float(root), which))  # pyright: ignore[reportArgumentType]
+        return min(crossings, default=None)
+
+    def held(self, here: float, state: FloatArray, time: FloatArray) -> _Phase:
+        x, last = float(state[0]), float(time[-1])
 
         def margin(t):
             return self.law.release(self.load(t, x, 0.0))
 
-        end, left, looks = last, here, 64
+        end, left, looks, let_go = last, here, 64, None
         while left < last:
             grid = np.minimum(left + self.watch * np.arange(looks + 1), last)
             loose = np.flatnonzero(margin(grid) < 0.0)
             if loose.size and loose[0] == 0:  # held at the first look only by rounding
-                end = here
+                end, let_go = here, -1
                 break
             if loose.size:
                 between = grid[loose[0] - 1 : loose[0] + 1]
                 end = float(brentq(margin, *between, xtol=1e-9 * self.watch))  # pyright: ignore[reportArgumentType]
+                let_go = -1
                 break
             left, looks = float(grid[-1]), min(2 * looks, 1024)
         samples = int(np.searchsorted(time, end, side="right"))
-        return _Phase(np.full(samples, x), np.zeros(samples), end, (x, 0.0))
+        return _Phase(np.array([[x], [0.0]]).repeat(samples, axis=1), end, np.array([x, 0.0]), let_go)
+
+
+def _joined(samples: Sequence[FloatArray], states: int) -> FloatArray:
+    return np.concatenate(samples, axis=1) if samples else np.empty((states, 0))
+
+
+def _bracket(guard: Callable[[float], float], grid: FloatArray, values: FloatArray) -> tuple[float, float] | None:
+    """Two times between which a guard, seen as `values` (looks,) on `grid` (looks,), first becomes negative."""
+    negative = np.flatnonzero(values[1:] <= 0.0) + 1
+    first = int(negative[0]) if negative.size else values.size
+    left, middle, right = values[:-2], values[1:-1], values[2:]
+    for i in np.flatnonzero((middle <= left) & (middle <= right)).tolist():
+        if i + 1 >= first:
+            break
+        bend = left[i] - 2.0 * middle[i] + right[i]
+        # The parabola through three looks tells where it is worth while to search for the bottom between them.
+        if bend > 0.0 and (left[i] - right[i]) ** 2 / (8.0 * bend) < 0.5 * middle[i]:
+            continue
+        bounds, fine = (grid[i], grid[i + 2]), 1e-6 * (grid[-1] - grid[0])
+        bottom = minimize_scalar(guard, bounds=bounds, method="bounded", options={"xatol": fine})
+        if bottom.fun < 0.0:  # pyright: ignore[reportAttributeAccessIssue]
+            return float(grid[i]), float(bottom.x)  # pyright: ignore[reportAttributeAccessIssue]
+    if not negative.size:
+        return None
+    if negative.size == values.size - first:  # a single crossing
+        return float(grid[0]), float(grid[-1])
+    return float(grid[first - 1]), float(grid[first])

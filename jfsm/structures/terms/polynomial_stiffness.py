@@ -1,6 +1,7 @@
 """Springs that are powers of the displacement."""
 
 import equinox as eqx
+import jax.numpy as jnp
 
 from ..._types import as_scalar
 from .._term import AbstractTerm, Parameter, Scalar, as_link
@@ -28,3 +29,48 @@ class QuadraticStiffness(AbstractTerm):
 
     def force(self, d, w, z, t):
         return self.k2 * d * d
+
+
+class QuinticStiffness(AbstractTerm):
+    """Quintic spring, force k5·d⁵."""
+
+    k5: Scalar = eqx.field(converter=as_scalar)
+    at: tuple[int, int] = eqx.field(converter=as_link, static=True, kw_only=True)
+    kind = "quintic_stiffness"
+    parameters = (Parameter("k5", force=1, length=-5, positive=False, meaning="quintic stiffness"),)
+
+    def force(self, d, w, z, t):
+        return self.k5 * d**5
+
+
+class SquareStiffness(AbstractTerm):
+    """Odd quadratic spring, force k2·d·abs(d)."""
+
+    k2: Scalar = eqx.field(converter=as_scalar)
+    at: tuple[int, int] = eqx.field(converter=as_link, static=True, kw_only=True)
+    kind = "square_stiffness"
+    parameters = (Parameter("k2", force=1, length=-2, positive=False, meaning="odd quadratic stiffness"),)
+
+    def force(self, d, w, z, t):
+        return self.k2 * d * jnp.abs(d)
+
+
+class DoubleWell(AbstractTerm):
+    """A buckled spring, force -k_neg·d + k3·d³: the linear stiffness turns negative."""
+
+    k_neg: Scalar = eqx.field(converter=as_scalar)
+    k3: Scalar = eqx.field(converter=as_scalar)
+    at: tuple[int, int] = eqx.field(converter=as_link, static=True, kw_only=True)
+    kind = "double_well"
+    parameters = (
+        Parameter("k_neg", force=1, length=-1, meaning="stiffness lost at the centre"),
+        Parameter("k3", force=1, length=-3, meaning="cubic stiffness"),
+    )
+
+    def force(self, d, w, z, t):
+        return (self.k3 * d * d - self.k_neg) * d
+
+    @classmethod
+    def shapes(cls, scale):
+        k, x = scale.force / scale.length, scale.length
+        return [{"k_neg": 1.3 * k, "k3": ratio * k / x**2} for ratio in (0.15, 0.3, 0.6, 1.2)]

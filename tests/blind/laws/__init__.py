@@ -2,9 +2,48 @@
 
 from .base import Law as Law
 from .base import NoLaw as NoLaw
-from .damping import Coulomb, QuadraticDamping
-from .stiffness import CubicHardening, CubicSoftening, QuadraticStiffness
+from .base import Scene as Scene
+from .damping import (
+    BilinearDamping,
+    Coulomb,
+    CoulombAsymmetric,
+    CubicDamping,
+    PositionDamping,
+    PowerDamping,
+    QuadraticDamping,
+    SmoothCoulomb,
+    Stribeck,
+    VanDerPol,
+)
+from .input import PeriodicDisturbance, Preload
+from .memory import AttachedOscillator, BoucWen, DelayedForce, FreePlay, Jenkins, LuGre, Maxwell
+from .stiffness import (
+    BilinearStiffness,
+    CubicHardening,
+    CubicSoftening,
+    DeadZone,
+    DoubleWell,
+    EndStop,
+    QuadraticStiffness,
+    QuinticStiffness,
+    Saturation,
+    SineStiffness,
+    SquareStiffness,
+)
+from .time import DampingDrift, ParametricStiffness, StiffnessDrift, StiffnessDrop
 
-LAWS: dict[str, type[Law]] = {
+FIRST_LAWS: dict[str, type[Law]] = {
     law.cause: law for law in (CubicHardening, CubicSoftening, QuadraticStiffness, QuadraticDamping, Coulomb)
+}
+LAWS: dict[str, type[Law]] = FIRST_LAWS | {
+    law.cause: law
+    for law in (
+        *(QuinticStiffness, BilinearStiffness, DeadZone, EndStop),
+        *(Saturation, DoubleWell, SineStiffness, SquareStiffness),
+        *(CoulombAsymmetric, Stribeck, SmoothCoulomb, CubicDamping),
+        *(PowerDamping, VanDerPol, PositionDamping, BilinearDamping),
+        *(BoucWen, Jenkins, LuGre, FreePlay, Maxwell, AttachedOscillator, DelayedForce),
+        *(StiffnessDrift, StiffnessDrop, DampingDrift, ParametricStiffness),
+        *(Preload, PeriodicDisturbance),
+    )
 }

@@ -1,0 +1,191 @@
+"""Where a search for a law's numbers begins: the shapes that explain most of what the rest of the structure leaves.
+
+The force that the structure lacks without the law is smoothed from the record; every natural shape of the law is
+evaluated along the smoothed motion, and its size found by linear regression beside errors of the springs, the dashpots
+and the offsets. It is equation error, good for a start and for nothing more.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..dynamics._along import force_along
+from ..dynamics._plant import Grid, Plant, direction, lower
+from ..estimation import Latent, latent_force
+from ..structures import AbstractTerm, LinearDamping, LinearStiffness, MapTerm, Scale, Structure
+from ._nuisances import Nuisances
+
+_SAMPLES = 8192
+_AT_ONCE = 256
+"""Shapes evaluated in one call; a short list is filled up, so that one program serves all."""
+_ALIKE = 0.98
+"""Correlation of two forces from which they are one start."""
+_LEAST = 1e-4
+"""Size of an effect, as a share of the elastic force, below which it is no start."""
+
+
+def scale_of(nuisances: Nuisances, structure: Structure) -> Scale:
+    """Sizes of a record's motion."""
+    masses = np.asarray(structure.mass)
+    mass = float(np.mean(masses if masses.ndim == 1 else np.diag(masses)))
+    force, time = mass * nuisances.omega**2 * nuisances.length, nuisances.record.time
+    return Scale(
+        force, nuisances.length, nuisances.crest * nuisances.length, nuisances.omega, float(time[0]), float(time[-1])
+    )
+
+
+def missing_force(structure: Structure, nuisances: Nuisances) -> Latent:
+    """Smoothed motion of a record, and the force that a structure lacks to explain it."""
+    n = min(nuisances.samples, _SAMPLES)
+    return latent_force(
+        lower(structure, nuisances.channels, grid=Grid(nuisances.record.dt, nuisances.fine.substeps)),
+        nuisances.show,
+        nuisances.fine,
+        np.asarray(nuisances.readings.values)[:n],
+        np.asarray(nuisances.readings.use)[:n],
+        np.asarray(nuisances.readings.variance),
+        nuisances.force_variance,
+        nuisances.omega,
+        nuisances.length,
+    )
+
+
+def law_terms(structure: Structure) -> tuple[AbstractTerm, ...]:
+    """Terms whose numbers a search may begin elsewhere than where they stand."""
+    return tuple(t for t in structure.terms if not isinstance(t, LinearStiffness | LinearDamping | MapTerm))
+
+
+def starts(structure: Structure, nuisances: Nuisances, most: int = 3, rounds: int = 2) -> list[Structure]:
+    """Structures to begin a fit from, the most promising first; none where there is no law to place.
+
+    With several laws each is placed in turn beside the others, and only the best of all comes back.
+    """
+    laws = law_terms(structure)
+    if not laws:
+        return []
+    rest = structure
+    for law in laws:
+        rest = rest.without(law)
+    latent = missing_force(rest, nuisances)
+    scale = scale_of(nuisances, structure)
+    best: dict[int, AbstractTerm] = {}
+    for _ in range(rounds if len(laws) > 1 else 1):
+        for i, law in enumerate(laws):
+            others = [term for k, term in best.items() if k != i]
+            found = place(law, latent, structure, scale, nuisances, others)
+            if len(laws) == 1:
+                return [_with(structure, {id(law): term}) for term in found[:most]]
+            if found:
+                best[i] = found[0]
+    return [_with(structure, {id(law): best[i] for i, law in enumerate(laws) if i in best})]
+
+
+def _with(structure: Structure, instead: Mapping[int, AbstractTerm]) -> Structure:
+    """The structure with some of its terms, by identity, replaced."""
+    terms = [instead.get(id(term), term) for term in structure.terms]
+    return Structure(structure.mass, terms, structure.sensors, structure.trust)
+
+
+def place(
+    law: AbstractTerm,
+    latent: Latent,
+    structure: Structure,
+    scale: Scale,
+    nuisances: Nuisances,
+    others: Sequence[AbstractTerm] = (),
+    sign: int = 0,
+) -> list[AbstractTerm]:
+    """Terms of `law`'s class at its place, best first, that explain a missing force beside `others`.
+
+    `sign` asks for that sign of the first number.
+    """
+    kind, n, dof = type(law), len(latent.force), structure.dof
+    time = jnp.asarray(nuisances.record.time[:n])
+    motion = (jnp.asarray(latent.displacement), jnp.asarray(latent.velocity), time)
+    spread = np.maximum(latent.force.std(0), 1e-300)
+    rows = _numbers(law, scale)
+    forces = np.concatenate([_forces(law, lot, structure, motion, len(chunk)) for chunk, lot in _lots(kind, rows)])
+    beside = [np.asarray(_along(lower(Structure(structure.mass, [t])), *motion)) for t in others]
+    basis = _basis(latent, structure, beside) / np.tile(spread, n)[:, None]
+    wanted = (latent.force / spread).ravel()
+    columns = (forces / spread).reshape(len(rows), n * dof)
+    q = np.linalg.qr(basis)[0]
+    wanted = wanted - q @ (q.T @ wanted)
+    columns = columns - (columns @ q) @ q.T
+    power = np.maximum(np.sum(columns**2, 1), 1e-300)
+    size = columns @ wanted / power
+    gain = size**2 * power
+    one_sign = all(p.positive for p in kind.parameters if p.force)
+    usable = np.isfinite(gain) & (power > 1e-12 * wanted.size)
+    usable &= (size > _LEAST) if one_sign else (np.abs(size) > _LEAST)
+    if sign:
+        usable &= np.array([np.sign(s * next(iter(row.values()))) == sign for s, row in zip(size, rows, strict=True)])
+    found, kept = [], []
+    for k in np.argsort(-np.where(usable, gain, -np.inf)):
+        if not usable[k] or len(found) == 8:
+            break
+        shape = columns[k] / np.sqrt(power[k])
+        if all(abs(shape @ other) < _ALIKE for other in kept):
+            kept.append(shape)
+            numbers = {p.name: rows[k][p.name] * (size[k] if p.force else 1.0) for p in kind.parameters}
+            found.append(kind(**numbers, at=law.at))
+    return found
+
+
+def _numbers(law: AbstractTerm, scale: Scale) -> list[dict[str, float]]:
+    """Natural shapes of a law; a side that was chosen stays, and so does the origin of time."""
+    stays = {p.name: float(getattr(law, p.name)) for p in law.parameters if not p.free}
+    rows = type(law).shapes(scale)
+    if "side" in stays:
+        rows = [row for row in rows if row["side"] == stays["side"]]
+    return [row | stays for row in rows]
+
+
+def _lots(kind: type[AbstractTerm], rows: list[dict[str, float]]):
+    for begin in range(0, len(rows), _AT_ONCE):
+        chunk = rows[begin : begin + _AT_ONCE]
+        filled = chunk + [chunk[-1]] * (-len(chunk) % (16 if len(chunk) <= 16 else _AT_ONCE))
+        yield chunk, np.array([[row[p.name] for p in kind.parameters] for row in filled])
+
+
+def _forces(law: AbstractTerm, numbers: np.ndarray, structure: Structure, motion, count: int) -> np.ndarray:
+    """Forces (count, n, dof) of a law along a motion for rows of its numbers."""
+    unit = type(law)(**dict(zip((p.name for p in law.parameters), numbers[0], strict=True)), at=law.at)
+    plant = lower(Structure(structure.mass, [unit]))
+    slots = {name: getattr(plant, name) for name in ("smooth", "friction", "memory", "delayed")}
+    name = next(name for name, slot in slots.items() if len(slot))
+    width = slots[name].parameters.shape[1]
+    padded = np.zeros((len(numbers), 1, width))
+    padded[:, 0, : numbers.shape[1]] = numbers
+    return np.asarray(_along_each(plant, name, jnp.asarray(padded), *motion))[:count]
+
+
+@eqx.filter_jit
+def _along_each(plant: Plant, name: str, numbers, x, v, time):
+    def one(row):
+        return force_along(eqx.tree_at(lambda p: getattr(p, name).parameters, plant, row), x, v, time)
+
+    return jax.lax.map(one, numbers, batch_size=16)
+
+
+@eqx.filter_jit
+def _along(plant: Plant, x, v, time):
+    return force_along(plant, x, v, time)
+
+
+def _basis(latent: Latent, structure: Structure, beside: Sequence[np.ndarray]) -> np.ndarray:
+    """Columns (n·dof, columns) of what may be off besides: springs, dashpots, constant forces; and given forces."""
+    n, dof = latent.force.shape
+    columns = list(beside)
+    for term in structure.terms:
+        if isinstance(term, LinearStiffness | LinearDamping):
+            row = direction(term.at, dof)
+            motion = latent.displacement if isinstance(term, LinearStiffness) else latent.velocity
+            columns.append((motion @ row)[:, None] * row)
+    for j in range(dof):
+        columns.append(np.ones((n, 1)) * (np.arange(dof) == j))
+    flat = np.stack([c.ravel() for c in columns], 1)
+    return flat / np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
