@@ -1,5 +1,6 @@
 """jfsm: what a simulation gets wrong, the name of the cause, and the gain of mending it."""
 
+from . import systems as systems
 from .diagnosis import Diagnosis as Diagnosis
 from .diagnosis import diagnose as diagnose
 from .dynamics import Backbone as Backbone

@@ -209,6 +209,9 @@ def diagnose(
     report: Annotated[Path | None, _option("Write the page here, as HTML.")] = None,
     json: Annotated[Path | None, _option("Write every number here, as JSON.")] = None,
     extended: Annotated[Path | None, _option("Write the mended model here, as TOML.")] = None,
+    cause: Annotated[
+        list[str] | None, typer.Option(help="Look for this cause (`jfsm causes` lists them); repeat for more.")
+    ] = None,
     key: Seed = None,
 ) -> None:
     """Say what a model gets wrong about a record, why, and what mending it is worth."""
@@ -218,7 +221,7 @@ def diagnose(
     _check_outputs({"--report": report, "--json": json, "--extended": extended}, inputs)
     record, held, believed = source.read(), _holdout(holdout, source), _load(model)
     with _progress() as tell:
-        d = diagnose(record, believed, holdout=held, key=_key(key), progress=tell)
+        d = diagnose(record, believed, holdout=held, causes=cause, key=_key(key), progress=tell)
     if report is not None:
         d.report(report)
     if json is not None:
@@ -235,14 +238,21 @@ def diagnose(
 
 @command
 def causes() -> None:
-    """List the causes that a diagnosis can name."""
+    """List the catalogue of causes, and which of them a diagnosis looks for unless told otherwise."""
+    from .diagnosis import SOUGHT
     from .structures import causes
 
     rows = [
-        (cause.id, cause.family, ", ".join(p.name for p in cause.effect.parameters), cause.sentence)
+        (
+            cause.id,
+            cause.family,
+            ", ".join(p.name for p in cause.effect.parameters),
+            "always" if cause.is_value else "yes" if cause.id in SOUGHT else "if asked",
+            cause.sentence,
+        )
         for cause in causes().values()
     ]
-    _table("Causes", ("cause", "family", "parameters", "what it is"), rows)
+    _table("Causes", ("cause", "family", "parameters", "looked for", "what it is"), rows)
 
 
 @command

@@ -3,8 +3,10 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import zip_longest
 
+from ..estimation import Latent
 from ..identification import (
     DEGREES,
     DEGREES_BESIDE,
@@ -12,9 +14,12 @@ from ..identification import (
     Nuisances,
     Unknown,
     effect_unknown,
+    missing_force,
     natural_size,
     nuisance_unknowns,
     own_unknown,
+    place,
+    scale_of,
     with_offsets,
 )
 from ..structures import Cause, Structure, causes
@@ -26,6 +31,8 @@ A softening spring that outweighs the elastic one at a peak would let the motion
 """
 
 
+_SHAPES = 2
+"""Shapes of a law that are followed."""
 SOUGHT = (
     "cubic_hardening", "cubic_softening", "quadratic_stiffness", "coulomb", "quadratic_damping", "force_gain",
     "accel_gain",
@@ -73,16 +80,38 @@ def candidates(
     places: Sequence[tuple] | None = None,
 ) -> list[Candidate]:
     """Every cause of `selection` at every place: link laws on the model's links, sensor effects on the channels."""
-    found = []
+    found, shaped = [], _Shaped(model, records[0])
     for cause in selection.values():
+        if not any(p.free for p in cause.effect.parameters):
+            continue  # nothing to fit: what a clipped channel lost takes no part anyway
         if cause.is_sensor:
             kinds = [kind for kind in cause.effect.channels if _has_scale(kind, records)]
             spots: list[tuple] = list(dict.fromkeys(c for n in records for c in n.record.channels if c[0] in kinds))
         else:
             spots = list(model.links) if places is None else list(places)
         for at in spots:
-            found.append(Candidate(cause, tuple(at), _starts(model, cause, at, records[0])))
+            several = not cause.is_sensor and len(cause.effect.parameters) > 1
+            starts = shaped.starts(cause, at) if several else _starts(model, cause, at, records[0])
+            if starts:
+                found.append(Candidate(cause, tuple(at), starts))
     return found
+
+
+class _Shaped:
+    """Starts of laws with a shape of their own: those that explain most of what the model lacks."""
+
+    def __init__(self, model: Structure, nuisances: Nuisances):
+        self.model, self.nuisances = model, nuisances
+
+    @cached_property
+    def missing(self) -> Latent:
+        return missing_force(self.model, self.nuisances)
+
+    def starts(self, cause: Cause, at: tuple[int, int]) -> tuple[Structure, ...]:
+        scale = scale_of(self.nuisances, self.model)
+        law = cause.effect(**cause.effect.shapes(scale)[0], at=at)
+        found = place(law, self.missing, self.model, scale, self.nuisances, sides=True, sign=cause.sign)
+        return tuple(self.model + term for term in found[:_SHAPES])
 
 
 def _has_scale(kind: str, records: Sequence[Nuisances]) -> bool:
@@ -138,7 +167,7 @@ def hypothesis(
     given = set(model.entries())
     own = own_paths(model, records) if refit else ()
     for start, begin in zip_longest(starts, begins):
-        effect = [p for p in start.entries() if p not in given]
+        effect = [p for p, (what, _) in start.entries().items() if p not in given and what.free]
         structure = with_offsets(start, records)
         degrees = DEGREES_BESIDE if effect else DEGREES
         mine: list[Unknown] = [own_unknown(structure, p, trust, degrees) for p in own]

@@ -20,6 +20,8 @@ _STEP_ANGLE = 0.22
 """Largest angle of the fastest mode per step [rad]: Runge-Kutta of order four then shifts a frequency by 2e-5."""
 _MOST_SUBSTEPS = 16
 _MOST_STIFF_SUBSTEPS = 64
+_STIFF_ANGLE = 1.0
+"""The same for what is faster than the linear part: what it follows is slow, so that it need not be followed closely."""
 _KINKED_SUBSTEPS = 2
 """Steps per sample at least for hidden states, which yield and slide at instants of their own."""
 _STABLE_ANGLE = 2.6
@@ -45,7 +47,7 @@ def substeps_for(structure: Structure, dt: float, speed: float = 0.0) -> int:
     """Steps per sample, a power of two, that keep the angle per step of the fastest mode or decay small.
 
     Laws beside the linear ones may be faster, at rest or at about `speed`: bristles, a friction that turns over
-    steeply. For these the steps need only be stable.
+    steeply. For these the steps may be longer.
 
     Raises
     ------
@@ -65,7 +67,7 @@ def substeps_for(structure: Structure, dt: float, speed: float = 0.0) -> int:
     most = _MOST_SUBSTEPS
     if len(plant.smooth) or len(plant.memory):
         rates = [_fastest_rate(plant, v) for v in (zero, zero + speed, zero - speed)]
-        need = max(need, _KINKED_SUBSTEPS if len(plant.memory) else 1, max(rates) * dt / _STABLE_ANGLE)
+        need = max(need, _KINKED_SUBSTEPS if len(plant.memory) else 1, max(rates) * dt / _STIFF_ANGLE)
         most = _MOST_STIFF_SUBSTEPS
     return min(most, 2 ** math.ceil(math.log2(need)))
 

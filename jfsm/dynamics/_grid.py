@@ -101,7 +101,7 @@ def delayed_force(plant: Plant, minv, motion: Motion, past: Past, g, time, step)
     """
     halves = g.shape[0]
     x, v = jnp.concatenate([motion.x[None, :], past.x]), jnp.concatenate([motion.v[None, :], past.v])
-    a = acceleration(plant, minv, *motion, g[0], time)[0]
+    a = acceleration(plant, minv, motion.x, motion.v, motion.z, motion.mode, g[0], time)[0]
     ahead = jnp.linspace(0.0, 1.0, halves)
     slots, total = plant.delayed, jnp.zeros(g.shape)
     for i in range(len(slots)):
@@ -210,7 +210,7 @@ def free_run(plant: Plant, fine: Fine, x0, v0):
         motion, past = carry
         force, base, time = inputs
         g = load_of(plant, minv, motion, past, force, base, time, fine.step)
-        a = acceleration(plant, minv, *motion, g[0], time)[0]
+        a = acceleration(plant, minv, motion.x, motion.v, motion.z, motion.mode, g[0], time)[0]
         after = advance_sample(plant, minv, motion, g, base, time, fine.step)
         return (after, remember(past, motion.x, motion.v)), (motion.x, motion.v, a)
 

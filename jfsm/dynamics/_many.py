@@ -116,7 +116,8 @@ def simulate_many(
             escape[k] = record.time[stop]
             for out in found:
                 out[k, stop:] = out[k, max(stop - 1, 0)]
-    return Responses(record.time, *found, escape)
+    x, v, a = found
+    return Responses(record.time, x, v, a, escape)
 
 
 def _states(initial_states: tuple[Any, Any], dof: int) -> tuple[np.ndarray, np.ndarray]:

@@ -26,14 +26,16 @@ from ..structures import (
 from ..surrogates import AbstractForceStateMap, tabulate
 from ._drive import Reconstruction
 from ._excitation import bucket, excitation, force_limits, measured_force, substeps_for, typical_speed
-from ._grid import punctual, run_grid, true_force
+from ._grid import Fine, punctual, run_grid, true_force
 from ._plant import Grid, Plant, lower
 from ._reference import run_reference
 from ._start import starting_state
 from ._stepper import free_acceleration, inverse_mass
 
-_FIXED_SUBSTEPS = 4
-"""Steps per sample at least where something sticks or answers the past; the error falls with the fourth power."""
+_FINER = 4
+"""Steps here for each that the likelihood takes: the error of a smooth motion falls with the fourth power."""
+_MOST_FINER = 64
+"""Steps per sample up to which they are refined so; beyond, they are doubled only."""
 _BOUND = 1e6
 """A motion this many times larger than anything that was measured or could be driven has escaped."""
 
@@ -92,7 +94,7 @@ def simulate(
     window: int = 50,
     reconstruction: Reconstruction = "band-limited",
     solver: Literal["reference", "grid"] = "reference",
-    tolerance: float = 1e-8,
+    tolerance: float = 1e-10,
 ) -> Response:
     """Free run of `model` under the force (or base motion) of `record`.
 
@@ -108,10 +110,12 @@ def simulate(
     reconstruction : "band-limited", "linear" or "hold"
         The force between its samples.
     solver : "reference" or "grid"
-        ``"reference"``: Tsitouras' 5(4) with step control at `tolerance` where nothing sticks. ``"grid"``: fixed
-        Runge-Kutta steps with located reversals, as the likelihood uses; always where something sticks.
+        ``"reference"``: Tsitouras' 5(4) with step control at `tolerance` where nothing sticks or answers the past.
+        ``"grid"``: fixed Runge-Kutta steps with located reversals, of the kind that the likelihood takes but four times
+        as many; always where something sticks or answers the past.
     tolerance : float
-        Relative, per step, of the motion's size.
+        Relative, per step, of the motion's size. Over a hundred periods the errors of the steps add up to a thousand
+        times as much.
 
     Returns
     -------
@@ -129,16 +133,19 @@ def simulate(
     channels = tuple(record.responses)
     exact = lower(model, channels)
     fixed = bool(len(exact.friction) or len(exact.delayed))  # what sticks or answers the past has a scheme of its own
-    substeps = substeps_for(model, record.dt, typical_speed(record))
-    substeps = max(substeps, _FIXED_SUBSTEPS) if fixed else 2 * substeps
-    plant = lower(model, channels, grid=Grid(record.dt, substeps))
+    substeps = finer(substeps_for(model, record.dt, typical_speed(record)))
     force = measured_force(record, model.dof, force_limits(model))
     fine = excitation(record, model.dof, substeps, reconstruction, length=bucket(len(record)), force=force)
     x0, v0 = starting_state(model, record, initial_state, window=window, reconstruction=reconstruction)
     # The grid run is cheap, and tells where an unstable motion leaves, before any step control meets it.
     start = jnp.asarray(x0), jnp.asarray(v0)
-    x, v, a = (np.asarray(q)[: len(record)] for q in run_grid(plant, fine, *start))
-    stop, used = _escape(plant, fine, x, v, record, x0), "grid"
+    # What answers the past remembers the motion once per sample of the drive, so here every step is one.
+    every = substeps if len(exact.delayed) and solver == "reference" else 1
+    plant = lower(model, channels, grid=Grid(record.dt / every, substeps // every))
+    run = run_grid(plant, _by_steps(fine) if every > 1 else fine, *start)
+    x, v, a = (np.asarray(q)[::every][: len(record)] for q in run)
+    escape = int(escapes(motion_bound(plant, fine, record, x0, x), x, v))
+    stop, used = (escape if escape < len(record) else None), "grid"
     if stop is None and solver == "reference" and not fixed:
         scale = jnp.maximum(jnp.std(jnp.asarray(x)), 1e-30)
         run = run_reference(exact, fine, *start, jnp.asarray(tolerance, dtype=jnp.float64), scale)
@@ -209,19 +216,41 @@ def _accelerations(plant: Plant, fine, x, v, z):
     return jax.vmap(one)(fine.force, fine.base, fine.time, x, v, z)
 
 
-def motion_bound(plant: Plant, fine, record: Record, x0, x) -> float:
-    """Displacement beyond which a run has escaped: far more than was measured, could be driven, or is usual in it."""
-    measured = [np.max(np.abs(y)) for (kind, _), y in record.responses.items() if kind == "displacement"]
-    stiffness, mass = float(jnp.max(jnp.abs(plant.stiffness))), float(jnp.max(jnp.abs(plant.mass)))
-    driving = float(jnp.max(jnp.abs(fine.force))) + mass * float(jnp.max(jnp.abs(fine.base)))
-    static = driving / stiffness if stiffness > 0 else driving * record.duration**2 / mass
+def finer(substeps: int) -> int:
+    """Steps per sample of a run that is to be looked at, from those that the likelihood would take."""
+    return max(min(_FINER * substeps, _MOST_FINER), 2 * substeps)
+
+
+def _by_steps(fine: Fine) -> Fine:
+    """The same drive with every step a sample of its own."""
+    n, substeps = fine.force.shape[0], fine.substeps
+    step = fine.step / substeps
+    nodes = 2 * jnp.arange(substeps)[:, None] + jnp.arange(3)[None, :]
+    return Fine(
+        fine.force[:, nodes].reshape(n * substeps, 3, -1),
+        fine.base[:, nodes].reshape(n * substeps, 3),
+        (fine.time[:, None] + step * jnp.arange(substeps)[None, :]).reshape(-1),
+        step,
+    )
+
+
+def motion_bound(plant: Plant, fine: Fine, record: Record, x0: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Displacement beyond which a run has escaped: far more than was measured, could be driven, or is usual in it.
+
+    The plant's matrices, `x0` (..., dof) and `x` (..., n, dof) may have leading axes, one bound for each.
+    """
+    measured = max((np.max(np.abs(y)) for (kind, _), y in record.responses.items() if kind == "displacement"), default=0)
+    stiffness, mass = (np.max(np.abs(np.asarray(q)), axis=(-2, -1)) for q in (plant.stiffness, plant.mass))
+    driving = np.max(np.abs(np.asarray(fine.force))) + mass * np.max(np.abs(np.asarray(fine.base)))
+    static = driving / np.where(stiffness > 0, stiffness, mass / record.duration**2)
     # With nothing else to compare with, the median of the run has to do.
-    own = float(np.nanmedian(np.abs(np.where(np.isfinite(x), x, np.nan)))) if np.any(np.isfinite(x)) else 0.0
-    return _BOUND * max([*measured, static, float(np.max(np.abs(x0))), own, 1e-300])
+    own = np.nanmedian(np.abs(np.where(np.isfinite(x), x, np.nan)), axis=(-2, -1))
+    sizes = (static, np.max(np.abs(x0), axis=-1), own)
+    return _BOUND * np.maximum(np.max(np.stack(np.broadcast_arrays(*sizes)), axis=0), max(measured, 1e-300))
 
 
-def _escape(plant: Plant, fine, x, v, record: Record, x0) -> int | None:
-    """First sample beyond every bound, if any."""
-    bound = motion_bound(plant, fine, record, x0, x)
-    bad = ~np.all(np.isfinite(x) & np.isfinite(v) & (np.abs(x) < bound), axis=1)
-    return int(np.argmax(bad)) if np.any(bad) else None
+def escapes(bound: np.ndarray, x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """First sample of each run (..., n, dof) beyond its bound; n where there is none."""
+    good = np.isfinite(x) & np.isfinite(v) & (np.abs(x) < bound[..., None, None])
+    bad = ~np.all(good, axis=-1)
+    return np.where(np.any(bad, axis=-1), np.argmax(bad, axis=-1), x.shape[-2])

@@ -13,6 +13,10 @@ from ._posterior import LANES as LANES
 from ._posterior import Hypothesis as Hypothesis
 from ._posterior import Posterior as Posterior
 from ._posterior import prior as prior
+from ._starts import missing_force as missing_force
+from ._starts import place as place
+from ._starts import scale_of as scale_of
+from ._starts import starts as starts
 from ._unknowns import DEGREES as DEGREES
 from ._unknowns import DEGREES_BESIDE as DEGREES_BESIDE
 from ._unknowns import Unknown as Unknown

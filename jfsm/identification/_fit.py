@@ -20,6 +20,7 @@ _TIED = 0.98
 """Correlation from which two values cannot be told apart in practice,"""
 _SURE = 0.05
 """unless each is known to this relative standard error all the same."""
+_STEPS = 60
 _PURSUED = 2
 """Beginnings that are followed to the top."""
 _LOOSE = 0.5
@@ -106,10 +107,10 @@ def fit(
     intervals = {}
     for u, t, s in zip(unknowns[: len(free)], theta, error, strict=False):
         low, high = sorted((u.value(max(t - 1.96 * s, u.low)), u.value(min(t + 1.96 * s, u.high))))
-        intervals[u.path] = (low, high)
+        intervals[u.path] = (float(low), float(high))
     correlation = covariance / np.maximum(np.outer(error, error), 1e-300)
     pairs = {(free[i], free[j]): float(correlation[i, j]) for i in range(len(free)) for j in range(i)}
-    values = {u.path: u.value(t) for u, t in zip(unknowns[: len(free)], theta, strict=False)}
+    values = {u.path: float(u.value(t)) for u, t in zip(unknowns[: len(free)], theta, strict=False)}
     kept = without_small_offsets(posterior.structure(theta, lane), unknowns, theta, error)
     noise = {
         f"{kind} {j}": float(f * np.exp(t / 2))
@@ -152,7 +153,7 @@ def _best(beginnings: Sequence[tuple], prepared: Sequence[Nuisances]) -> tuple[P
     posteriors = [Posterior(Hypothesis(*zip(*lot, strict=True)), prepared) for lot in lots]
     rungs = [approach(posterior) for posterior in posteriors]
     order = np.argsort([float(np.min(rung.value)) for rung in rungs])[:_PURSUED]
-    tops = [(posteriors[k], finish(posteriors[k], rungs[k])) for k in order]
+    tops = [(posteriors[k], finish(posteriors[k], rungs[k], _STEPS)) for k in order]
     posterior, best = min(tops, key=lambda top: float(np.min(top[1].value)))
     return posterior, best, int(np.argmin(best.value))
 
@@ -221,9 +222,10 @@ def _words(
     relative = {
         u.path: s if u.log else s / max(abs(t), 1e-300) for u, t, s in zip(unknowns, theta, error, strict=False)
     }
+    by_path = {u.path: (u, t, s) for u, t, s in zip(unknowns, theta, error, strict=False)}
     for (a, b), r in pairs.items():
         if abs(r) > _TIED and min(relative[a], relative[b]) > _SURE:
-            joint = "their ratio" if r > 0 else "what they do together"
+            joint = _combination(by_path[a], by_path[b], r)
             words.append(f"{a} and {b} cannot be told apart by this record (correlation {r:+.3f}); {joint} can.")
     for u, t in zip(unknowns, theta, strict=False):
         if relative[u.path] > _LOOSE:
@@ -233,3 +235,15 @@ def _words(
         if t <= u.low or t >= u.high:
             words.append(f"{u.path} ends at its bound {u.value(t):.6g}.")
     return tuple(words)
+
+
+def _combination(first: tuple[Unknown, float, float], second: tuple[Unknown, float, float], r: float) -> str:
+    """What two numbers that are tied by a correlation `r` determine together."""
+    (u, t, s), (other, t2, s2) = first, second
+    if u.log and other.log:
+        return "their ratio" if r > 0 else "their product"
+    # The combination u + w·other that varies least.
+    weight = -r * (u.slope(t) * s) / (other.slope(t2) * s2)
+    if 0.8 < abs(weight) < 1.25:
+        return f"{u.path} {'+' if weight > 0 else '-'} {other.path}"
+    return f"{u.path} {weight:+.3g}·{other.path}"

@@ -78,7 +78,7 @@ def _climb(
     unknowns = posterior.hypothesis.unknowns
     low = np.array([[u.low for u in row] for row in unknowns])
     high = np.array([[u.high for u in row] for row in unknowns])
-    log = np.array([[u.log for u in row] for row in unknowns])
+    log = np.array([[u.log or u.path.startswith("noise@") for u in row] for row in unknowns])
     lanes = theta.shape[0]
     value, gradient, information = _finite(posterior.evaluate(theta, slack, most))
     damp = np.full(lanes, 1e-3)
@@ -88,7 +88,8 @@ def _climb(
         for lane in np.flatnonzero(open_):
             target = min(best, float(np.min(value)))
             behind = value[lane] - target if np.isfinite(target) and np.isfinite(value[lane]) else 0.0
-            if promise[lane] < enough + _HOPELESS * max(behind, 0.0) and damp[lane] < 1.0:
+            # A negative promise is no sign of a top, but of a step that its bounds bent: a shorter one will do.
+            if 0 <= promise[lane] < enough + _HOPELESS * max(behind, 0.0) and damp[lane] < 1.0:
                 open_[lane], results[lane] = False, Result.successful
             elif damp[lane] > 1e8:
                 open_[lane], results[lane] = False, Result.stalled
@@ -123,10 +124,28 @@ def _steps(theta, gradient, information, damp, low, high, log):
         longest = np.max(np.abs(step[log[lane]]), initial=0.0)
         if longest > _LONGEST:
             step *= _LONGEST / longest
-        step = np.clip(theta[lane] + step, low[lane], high[lane]) - theta[lane]
-        moves[lane] = step
+        moves[lane] = step = _confined(theta[lane], step, g, f + damp[lane] * np.diag(np.diag(f)), low[lane], high[lane])
         promises[lane] = -(g @ step) - 0.5 * step @ f @ step
     return moves, promises
+
+
+def _confined(theta, step, g, f, low, high):
+    """A step that would leave the bounds: what meets one goes up to it, and the others are solved for again."""
+    met = np.zeros(theta.size, bool)
+    still = step == 0  # held where they are
+    for _ in range(theta.size):
+        beyond = ~met & ((theta + step < low) | (theta + step > high))
+        if not np.any(beyond):
+            break
+        met |= beyond
+        step = np.where(beyond, np.clip(theta + step, low, high) - theta, step)
+        rest = ~met & ~still
+        if np.any(rest):
+            right = g[rest] + f[np.ix_(rest, met)] @ step[met]
+            again = -np.linalg.lstsq(f[np.ix_(rest, rest)], right, rcond=None)[0]
+            size, before = np.max(np.abs(again)), np.max(np.abs(step[rest]))
+            step[rest] = again if size <= before else again * before / size
+    return np.clip(theta + step, low, high) - theta
 
 
 def _finite(outcome):

@@ -23,6 +23,10 @@ _AT_ONCE = 256
 """Shapes evaluated in one call; a short list is filled up, so that one program serves all."""
 _ALIKE = 0.98
 """Correlation of two forces from which they are one start."""
+_SPRING, _DASHPOT, _CONSTANT = 0.15, 1.0, 10.0
+"""How far springs and dashpots may be off, as shares of themselves, and a constant force as a share of the missing."""
+_CORRELATED = 20.0
+"""Samples of a smoothed force that count as one."""
 _LEAST = 1e-4
 """Size of an effect, as a share of the elastic force, below which it is no start."""
 
@@ -97,27 +101,32 @@ def place(
     nuisances: Nuisances,
     others: Sequence[AbstractTerm] = (),
     sign: int = 0,
+    sides: bool = False,
 ) -> list[AbstractTerm]:
     """Terms of `law`'s class at its place, best first, that explain a missing force beside `others`.
 
-    `sign` asks for that sign of the first number.
+    `sign` asks for that sign of the first number; a side stays as it is unless `sides` are to be tried.
     """
     kind, n, dof = type(law), len(latent.force), structure.dof
     time = jnp.asarray(nuisances.record.time[:n])
     motion = (jnp.asarray(latent.displacement), jnp.asarray(latent.velocity), time)
     spread = np.maximum(latent.force.std(0), 1e-300)
-    rows = _numbers(law, scale)
+    rows = _numbers(law, scale, sides)
     forces = np.concatenate([_forces(law, lot, structure, motion, len(chunk)) for chunk, lot in _lots(kind, rows)])
     beside = [np.asarray(_along(lower(Structure(structure.mass, [t])), *motion)) for t in others]
-    basis = _basis(latent, structure, beside) / np.tile(spread, n)[:, None]
+    basis, doubt = _basis(latent, structure, beside)
+    basis = basis / np.tile(spread, n)[:, None]
     wanted = (latent.force / spread).ravel()
     columns = (forces / spread).reshape(len(rows), n * dof)
-    q = np.linalg.qr(basis)[0]
-    wanted = wanted - q @ (q.T @ wanted)
-    columns = columns - (columns @ q) @ q.T
+    left, beside_all, _, _ = _regressed(columns, wanted, basis)
+    # Springs and dashpots are known to some extent: without that, a law that is partly linear has no size of its own.
+    noise = np.sqrt(_CORRELATED * max(np.min(left @ left - beside_all), 1e-12 * wanted.size) / wanted.size)
+    ridge = np.diag(noise / doubt)
+    columns = np.hstack([columns, np.zeros((len(columns), len(ridge)))])
+    _, gain, size, columns = _regressed(
+        columns, np.concatenate([wanted, np.zeros(len(ridge))]), np.vstack([basis, ridge])
+    )
     power = np.maximum(np.sum(columns**2, 1), 1e-300)
-    size = columns @ wanted / power
-    gain = size**2 * power
     one_sign = all(p.positive for p in kind.parameters if p.force)
     usable = np.isfinite(gain) & (power > 1e-12 * wanted.size)
     usable &= (size > _LEAST) if one_sign else (np.abs(size) > _LEAST)
@@ -135,8 +144,10 @@ def place(
     return found
 
 
-def _numbers(law: AbstractTerm, scale: Scale) -> list[dict[str, float]]:
+def _numbers(law: AbstractTerm, scale: Scale, sides: bool) -> list[dict[str, float]]:
     """Natural shapes of a law; a side that was chosen stays, and so does the origin of time."""
+    if sides:
+        return type(law).shapes(scale)
     stays = {p.name: float(getattr(law, p.name)) for p in law.parameters if not p.free}
     rows = type(law).shapes(scale)
     if "side" in stays:
@@ -176,16 +187,27 @@ def _along(plant: Plant, x, v, time):
     return force_along(plant, x, v, time)
 
 
-def _basis(latent: Latent, structure: Structure, beside: Sequence[np.ndarray]) -> np.ndarray:
-    """Columns (n·dof, columns) of what may be off besides: springs, dashpots, constant forces; and given forces."""
+def _regressed(columns: np.ndarray, wanted: np.ndarray, basis: np.ndarray):
+    """What the basis leaves of `wanted`, how much of its square each column takes, with what factor; columns left."""
+    q = np.linalg.qr(basis)[0]
+    wanted = wanted - q @ (q.T @ wanted)
+    columns = columns - (columns @ q) @ q.T
+    power = np.maximum(np.sum(columns**2, 1), 1e-300)
+    size = columns @ wanted / power
+    return wanted, size**2 * power, size, columns
+
+
+def _basis(latent: Latent, structure: Structure, beside: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Columns (n·dof, columns) of what may be off besides, and how far: springs, dashpots, constants; given forces."""
     n, dof = latent.force.shape
-    columns = list(beside)
+    columns, doubt = list(beside), [1.0] * len(beside)
     for term in structure.terms:
         if isinstance(term, LinearStiffness | LinearDamping):
-            row = direction(term.at, dof)
-            motion = latent.displacement if isinstance(term, LinearStiffness) else latent.velocity
-            columns.append((motion @ row)[:, None] * row)
+            spring, row = isinstance(term, LinearStiffness), direction(term.at, dof)
+            motion = (latent.displacement if spring else latent.velocity) @ row
+            columns.append(float(term.values[0]) * motion[:, None] * row)
+            doubt.append(_SPRING if spring else _DASHPOT)
     for j in range(dof):
-        columns.append(np.ones((n, 1)) * (np.arange(dof) == j))
-    flat = np.stack([c.ravel() for c in columns], 1)
-    return flat / np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
+        columns.append(np.ones((n, 1)) * (np.arange(dof) == j) * np.std(latent.force))
+        doubt.append(_CONSTANT)
+    return np.stack([c.ravel() for c in columns], 1), np.array(doubt)

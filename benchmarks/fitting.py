@@ -1,0 +1,179 @@
+"""Does `jfsm.fit` find the right values of every law, from a start that knows nothing, and are its intervals honest?
+
+    python benchmarks/fitting.py --n 20 --seed 1 --jobs 2 --out fitting.jsonl [--causes bouc_wen jenkins ...]
+
+For every cause, records are drawn from plants with that law (SciPy, 1 % noise on every channel). The fit begins at the
+owner's model with the law at one of its natural shapes, drawn at random and of a third of the elastic force. It counts
+as converged when it ends no lower than a fit from the truth does. One line of JSON per record is appended as it is
+done; the same call goes on where it was stopped.
+"""
+
+import argparse
+import concurrent.futures
+import json
+import math
+import multiprocessing
+import os
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+import numpy as np  # noqa: E402  (needs the line above when run as a script)
+
+from benchmarks.blind import ONE_CORE  # noqa: E402
+from tests.blind import Challenge, draw  # noqa: E402
+
+NOT_FITTED = ("none", "stiffness_value", "damping_value", "mass_value", "clipping")
+BEHIND = 1.0
+"""Nats that a converged fit may end below the one from the truth."""
+
+Row = dict[str, Any]
+
+
+def examine(cause: str, seed: int, noise: float, excitations: Sequence[str]) -> Row:
+    """One record fitted from nowhere and from the truth."""
+    import jax  # only in the workers, whose environment is settled before it is loaded
+
+    jax.config.update("jax_enable_x64", True)
+    import jfsm
+
+    challenge = _draw(cause, seed, noise, excitations)
+    record = jfsm.Record(time=challenge.time, **challenge.channels, units=challenge.units, at_rest=challenge.at_rest)  # pyright: ignore[reportArgumentType]
+    row: Row = {"cause": cause, "seed": seed, "noise": noise, "excitation": challenge.excitation}
+    row["channel_set"] = challenge.channel_set
+    believed, truth = (jfsm.Structure.sdof(p.mass, p.stiffness, p.damping) for p in (challenge.model, challenge.truth))
+    entry = jfsm.causes()[cause]
+    numbers = {p.name: challenge.parameters[p.name] for p in entry.effect.parameters}
+    start = (
+        {p.name: 0.0 for p in entry.effect.parameters}
+        if entry.is_sensor
+        else _shape(record, believed, entry, seed, numbers)
+    )
+    names = [p.name for p in entry.effect.parameters if p.free]
+    place = "-".join(map(str, challenge.at))
+    try:
+        begin = time.perf_counter()
+        found = jfsm.fit(believed + entry.effect(**start, at=challenge.at), record)
+        row["seconds"] = time.perf_counter() - begin
+        best = jfsm.fit(truth + entry.effect(**numbers, at=challenge.at), record)
+    except Exception as problem:  # one failed fit must not end the examination; the table lists it
+        return row | {"error": f"{type(problem).__name__}: {problem}"[:300]}
+    row["behind"] = best.log_likelihood - found.log_likelihood
+    row["result"] = str(found.result)
+    row["values"] = {
+        name: {
+            "truth": numbers[name],
+            "value": found.values[f"{entry.effect.kind}@{place}.{name}"],
+            "interval": found.intervals[f"{entry.effect.kind}@{place}.{name}"],
+        }
+        for name in names
+    }
+    return row
+
+
+def _draw(cause: str, seed: int, noise: float, excitations: Sequence[str]) -> Challenge:
+    last: Exception | None = None
+    for attempt in range(20):  # some causes cannot be told from some records, or not every draw is a fair question
+        try:
+            return draw(seed + 100_000 * attempt, causes=cause, noise=noise, channels="xva", excitation=excitations)
+        except RuntimeError as problem:
+            last = problem
+    raise RuntimeError(f"no fair record with {cause}: {last}")
+
+
+def _shape(record: Any, model: Any, entry: Any, seed: int, numbers: dict[str, float]) -> dict[str, float]:
+    """A natural shape of the law, drawn; a side, an origin of time and the sign of a size are the truth's."""
+    from jfsm.identification import prepare, scale_of
+
+    shapes = entry.effect.shapes(scale_of(prepare(record, model), model))
+    shape = dict(shapes[np.random.default_rng(seed).integers(len(shapes))])
+    for p in entry.effect.parameters:
+        if not p.free:
+            shape[p.name] = numbers[p.name]
+        elif p.force:
+            shape[p.name] *= 0.3
+    first = entry.effect.parameters[0].name
+    shape[first] = math.copysign(shape[first], numbers[first])
+    return shape
+
+
+def covered(row: Row) -> list[bool]:
+    found = []
+    for value in row["values"].values():
+        low, high = value["interval"]
+        found.append(bool(low <= value["truth"] <= high))
+    return found
+
+
+def table(rows: Sequence[Row]) -> str:
+    lines = [f"{'cause':22s} fits  converged  intervals that cover   seconds (median)"]
+    total = [0, 0, 0, 0]
+    for cause in dict.fromkeys(row["cause"] for row in rows):
+        mine = [row for row in rows if row["cause"] == cause]
+        good = [row for row in mine if "error" not in row]
+        converged = sum(row["behind"] < BEHIND for row in good)
+        inside = [c for row in good if row["behind"] < BEHIND for c in covered(row)]
+        seconds = np.median([row["seconds"] for row in good]) if good else math.nan
+        lines.append(
+            f"{cause:22s} {len(mine):4d}  {converged:4d} {converged / len(mine):5.0%}  "
+            f"{sum(inside):5d} of {len(inside):4d}            {seconds:8.1f}"
+        )
+        total = [a + b for a, b in zip(total, (len(mine), converged, sum(inside), len(inside)), strict=True)]
+    share = total[2] / total[3] if total[3] else math.nan
+    lines.append(
+        f"{'all':22s} {total[0]:4d}  {total[1]:4d} {total[1] / total[0]:5.0%}  {total[2]} of {total[3]} = {share:.1%}"
+    )
+    lines += [f"  failed: {row['cause']} {row['seed']}: {row['error']}" for row in rows if "error" in row]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    from tests.blind import CAUSES
+    from tests.blind.drives import DRIVES
+
+    known = [cause for cause in CAUSES if cause not in NOT_FITTED]
+    parser = argparse.ArgumentParser(description="Convergence and coverage of jfsm.fit for every cause.")
+    parser.add_argument("--n", type=int, default=6, help="records per cause")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--noise", type=float, default=0.01)
+    parser.add_argument("--causes", nargs="+", default=known, choices=known, metavar="ID")
+    parser.add_argument("--excitation", nargs="+", default=list(DRIVES), choices=list(DRIVES))
+    parser.add_argument("--out", type=Path, required=True)
+    given = parser.parse_args()
+    rows: list[Row] = []
+    if given.out.exists():
+        rows = [json.loads(line) for line in given.out.read_text(encoding="utf-8").splitlines() if line.strip()]
+    done = {(row["cause"], row["seed"]) for row in rows}
+    wanted = [(c, s) for s in range(given.seed, given.seed + given.n) for c in given.causes if (c, s) not in done]
+    os.environ.update(ONE_CORE)  # spawned processes inherit it
+    context = multiprocessing.get_context("spawn")
+    pool = concurrent.futures.ProcessPoolExecutor(given.jobs, mp_context=context)
+    try:
+        waiting = [pool.submit(examine, c, s, given.noise, tuple(given.excitation)) for c, s in wanted]
+        for count, future in enumerate(concurrent.futures.as_completed(waiting), 1):
+            row = future.result()
+            rows.append(row)
+            with given.out.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(row) + "\n")
+            words = (
+                row.get("error") or f"behind {row['behind']:.2f}, {sum(covered(row))} of {len(covered(row))} covered"
+            )
+            print(
+                f"[{count}/{len(wanted)}] {row['cause']} {row['seed']}: {words}  {row.get('seconds', 0):.1f} s",
+                flush=True,
+            )
+    except KeyboardInterrupt:
+        print("stopped; what is done is kept")
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+    if rows:
+        print("\n" + table(rows))
+
+
+if __name__ == "__main__":
+    main()
