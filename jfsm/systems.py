@@ -125,7 +125,8 @@ def cubic_chain() -> Structure:
     Without the cubic spring 7.2535 and 23.3963 rad/s, both modes damped by 0.02. The printed matrix
     C = [[0.6913, -0.3132], [-0.3132, 0.5347]] N s/m is the modal one of these ratios and is taken here. It is not of
     the form of (88) and (89), where c₂₂ = -c₁₂: it needs a third dashpot, 0.2215 N s/m from ground to the second mass.
-    With two dashpots alone the same ratios take c₁ = 0.7472, c₂ = 0.2394 N s/m.
+    With two dashpots alone the same ratios take c₁ = 0.7472, c₂ = 0.2394 N s/m. (89) also prints k₁₂ and k₂₁ as slopes
+    of f₂ along x₂.
     """
     mass, stiffness = np.eye(2), np.array([[360.0, -240.0], [-240.0, 240.0]])
     chain = Structure.from_matrices(mass, stiffness, modal_damping(mass, stiffness, 0.02))
@@ -133,7 +134,7 @@ def cubic_chain() -> Structure:
 
 
 def _case_4() -> Structure:
-    # m ẍ + c ẋ + k x: the k x is missing in (90), but figures 17-19 have it
+    # k x is missing in (90), but the text finds k from the map, and without it case 4b would have no spring
     mass, stiffness, ratio = 1.77, 2500.0, 0.02
     return Structure.sdof(mass, stiffness, 2 * ratio * np.sqrt(stiffness * mass))
 
@@ -321,8 +322,8 @@ def emps() -> Structure:
 def lugre() -> Structure:
     """A mass pulled by a spring over bristles: 1 kg, 2 N/m, viscous friction 0.4 N s/m.
 
-    F = 1 N, F_static = 1.5 N, v_s = 1 mm/s, σ₀ = 10⁵ N/m, σ₁ = √10⁵ N s/m. Pulled at 0.1 m/s, by the
-    force 0.2 N/s·t, it stick-slips. Stuck, it vibrates with √(σ₀/m) = 316 rad/s and half of critical damping.
+    F = 1 N, F_static = 1.5 N, v_s = 1 mm/s, σ₀ = 10⁵ N/m, σ₁ = √10⁵ N s/m. Pulled at 0.1 m/s, by the force
+    0.2 N/s·t, it sticks and slips in turn. Stuck, it vibrates with √(σ₀/m) = 316 rad/s and half of critical damping.
 
     References
     ----------
@@ -489,7 +490,7 @@ FIELD = _table(
 """The field's systems by name."""
 
 ALL = PAPER | FIELD
-"""Every system by name."""
+"""Every system by name; all can move but `kinked_spring`, which has no mass."""
 
 EXAMPLES: dict[str, Callable[[ArrayLike], np.ndarray]] = {
     "example_1": example_1,

@@ -5,6 +5,7 @@ import secrets
 from collections.abc import Callable, Sequence
 
 import jax
+import numpy as np
 
 from .._types import require_x64
 from ..dynamics import Reconstruction
@@ -20,6 +21,7 @@ from ._residual import residual, stand_in
 from ._search import fit_model, search
 from ._trial import Trial
 
+_HEAVIER = 0.03
 Progress = Callable[[str, int, int], None]
 
 
@@ -83,6 +85,11 @@ def diagnose(
     given = fit_model("given", model, records, until, refit=False)
     steps.next("the model refitted")
     refitted = fit_model("refitted", model, records, until, refit=True)
+    if _outweighed(model, refitted.structure):
+        # The noise of the force acts through the mass, and all hypotheses share one noise: that of the likelier mass.
+        records = [prepare(r, model, reconstruction, weighed=refitted.structure) for r in whole]
+        given = fit_model("given", model, records, until, refit=False)
+        refitted = fit_model("refitted", model, records, until, refit=True)
     trials = search(tried, model, given, refitted, records, until, steps.next)
     steps.next("the missing force")
     periods = sum(n.record.duration for n in records) * records[0].omega / (2 * math.pi)
@@ -102,6 +109,12 @@ def diagnose(
             model, refitted.extended(), extended, held, noise, first.omega, first.reconstruction, key
         )
     return assemble(decision, refitted, trials, model, extended, records, missing, gain, runs)
+
+
+def _outweighed(model: Structure, refitted: Structure) -> bool:
+    """Whether a refit moves any mass by more than some per cent."""
+    stated, found = (np.asarray(s.mass) for s in (model, refitted))
+    return bool(np.any(np.abs(found - stated) > _HEAVIER * np.abs(stated)))
 
 
 class _Steps:

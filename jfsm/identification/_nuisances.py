@@ -88,8 +88,16 @@ class Nuisances:
         return Fine(f.force[:n], f.base[:n], f.time[:n], f.step), readings
 
 
-def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "band-limited") -> Nuisances:
+def prepare(
+    record: Record,
+    model: Structure,
+    reconstruction: Reconstruction = "band-limited",
+    *,
+    weighed: Structure | None = None,
+) -> Nuisances:
     """Nuisances of a record, scaled by the model as it is believed.
+
+    The noise of the force moves the masses of `weighed`, where these are known better than the model's.
 
     Raises
     ------
@@ -127,7 +135,7 @@ def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "
     notes += words
     omega = fastest_mode(model) or _rate(values[:, 0], dt)
     length, crest = _size(channels, values, spread, omega)
-    masses = np.asarray(model.mass)
+    masses = np.asarray((weighed or model).mass)
     mass = masses if masses.ndim == 1 else np.diag(masses)
     variance = np.array(floors) ** 2
     for i, (kind, j) in enumerate(channels):
