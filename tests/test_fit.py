@@ -208,3 +208,37 @@ TIME = DT * np.arange(100)
 def test_what_cannot_be_fitted_is_refused_with_the_reason(arguments, options, message):
     with pytest.raises(ValueError, match=message):
         jfsm.fit(*arguments, **options)
+
+
+def test_a_spring_between_two_masses_on_a_moving_base_is_found_from_accelerations():
+    t = 0.04 * np.arange(1500)
+    mass, springs, dashpots, cubic = np.array([1.0, 0.7]), (60.0, 40.0), (0.5, 0.4), 900.0
+
+    def base(s):
+        return 6.0 * np.sin(3.1 * s) + 5.0 * np.sin(7.3 * s + 1.0) + 4.0 * np.sin(11.9 * s + 2.0)
+
+    def restoring(x, v):
+        d, w = x[1] - x[0], v[1] - v[0]
+        between = springs[1] * d + dashpots[1] * w + cubic * d**3
+        return np.array([springs[0] * x[0] + dashpots[0] * v[0] - between, between])
+
+    def force(s):
+        return -mass * base(s)
+
+    x, v = smooth_motion(np.diag(mass), restoring, force, t, np.zeros(2), np.zeros(2), tolerance=1e-8)
+    relative = np.array([-base(s) - restoring(x[i], v[i]) / mass for i, s in enumerate(t)])
+    rng = np.random.default_rng(5)
+    absolute = relative + base(t)[:, None]
+    record = jfsm.Record(
+        t,
+        acceleration=absolute + 0.01 * absolute.std(0) * rng.standard_normal(absolute.shape),
+        base_acceleration=base(t),
+        at_rest=True,
+    )
+    guess = jfsm.Structure.chain(mass, [62.0, 38.0], [0.4, 0.5]) + jfsm.CubicStiffness(100.0, at=(1, 2))
+    found = jfsm.fit(guess, record, fixed=("mass",))
+    truth = {"stiffness@0-1.k": 60.0, "stiffness@1-2.k": 40.0, "damping@0-1.c": 0.5, "cubic_stiffness@1-2.k3": 900.0}
+    for path, value in truth.items():
+        low, high = found.intervals[path]
+        assert abs(found.values[path] - value) < high - low, path
+        assert high - low < 0.2 * value, path

@@ -21,7 +21,7 @@ _STEP_ANGLE = 0.22
 _MOST_SUBSTEPS = 16
 _MOST_STIFF_SUBSTEPS = 64
 _STIFF_ANGLE = 1.0
-"""The same for what is faster than the linear part: what it follows is slow, so that it need not be followed closely."""
+"""The same for what is faster than the linear part: it follows something slow, and need not be followed closely."""
 _KINKED_SUBSTEPS = 2
 """Steps per sample at least for hidden states, which yield and slide at instants of their own."""
 _STABLE_ANGLE = 2.6

@@ -124,7 +124,8 @@ def _steps(theta, gradient, information, damp, low, high, log):
         longest = np.max(np.abs(step[log[lane]]), initial=0.0)
         if longest > _LONGEST:
             step *= _LONGEST / longest
-        moves[lane] = step = _confined(theta[lane], step, g, f + damp[lane] * np.diag(np.diag(f)), low[lane], high[lane])
+        heavier = f + damp[lane] * np.diag(np.diag(f))
+        moves[lane] = step = _confined(theta[lane], step, g, heavier, low[lane], high[lane])
         promises[lane] = -(g @ step) - 0.5 * step @ f @ step
     return moves, promises
 

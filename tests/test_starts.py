@@ -1,0 +1,76 @@
+"""Where a search begins: shapes that explain the missing force, for one law and for two."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from references import smooth_motion
+
+import jfsm
+from jfsm.dynamics import lower
+from jfsm.dynamics._along import force_along
+from jfsm.identification import prepare, starts
+
+T = np.arange(1200) * 0.06
+MODEL = jfsm.Structure.sdof(1.0, 9.0, 0.3)
+
+
+def drive(t):
+    return 4 * np.cos(1.1 * t) + 3 * np.sin(2.3 * t + 1) + 3 * np.cos(3.7 * t + 2)
+
+
+def record(law) -> jfsm.Record:
+    def restoring(x, v):
+        return 9.0 * x + 0.3 * v + law(x, v)
+
+    x, v = smooth_motion(1.0, restoring, lambda t: np.array([drive(t)]), T, 0.0, 0.0, tolerance=1e-7)
+    rng = np.random.default_rng(4)
+    noisy = [y + 0.01 * np.std(y) * rng.standard_normal(T.size) for y in (drive(T), x[:, 0], v[:, 0])]
+    return jfsm.Record(T, noisy[0], noisy[1], noisy[2], at_rest=True)
+
+
+def test_the_first_start_is_near_the_truth_wherever_the_search_stood():
+    def stop(x, v):
+        return 12.0 * np.sign(x) * np.maximum(np.abs(x) - 0.8, 0.0)
+
+    r = record(stop)
+    wrong = MODEL + jfsm.EndStop(1.0, 0.05, at=(0, 1))
+    best = starts(wrong, prepare(r, wrong))[0].values()
+    assert best["end_stop@0-1.gap"] == pytest.approx(0.8, rel=0.3)
+    assert best["end_stop@0-1.k"] == pytest.approx(12.0, rel=0.5)
+    assert {p: v for p, v in best.items() if "end_stop" not in p} == MODEL.values()
+
+
+def test_two_laws_are_placed_beside_each_other():
+    r = record(lambda x, v: 3.0 * x**3 + 0.5 * v * np.abs(v))
+    wrong = MODEL + jfsm.CubicStiffness(0.1, at=(0, 1)) + jfsm.QuadraticDamping(0.01, at=(0, 1))
+    (best,) = starts(wrong, prepare(r, wrong))
+    assert best.values()["cubic_stiffness@0-1.k3"] == pytest.approx(3.0, rel=0.3)
+    assert best.values()["quadratic_damping@0-1.c2"] == pytest.approx(0.5, rel=0.5)
+
+
+def test_a_side_and_an_origin_of_time_are_no_matter_of_search():
+    r = record(lambda x, v: 2.0 * np.maximum(-0.2 - x, 0.0) * -1.0)
+    wrong = MODEL + jfsm.BilinearStiffness(1.0, 0.0, -1.0, at=(0, 1))
+    for found in starts(wrong, prepare(r, wrong)):
+        assert found.values()["bilinear_stiffness@0-1.side"] == -1.0
+
+
+def test_a_linear_structure_has_no_other_start():
+    r = record(lambda x, v: 0.0 * x)
+    assert starts(MODEL, prepare(r, MODEL)) == []
+
+
+@pytest.mark.parametrize(("term", "expected"), [
+    (jfsm.Maxwell(2.0, 0.5, at=(0, 1)), None),
+    (jfsm.DelayedForce(2.0, 0.31, at=(0, 1)), lambda t: 2.0 * np.where(t < 0.31, 1.0, np.cos(1.3 * (t - 0.31)))),
+    (jfsm.Coulomb(2.0, at=(0, 1)), lambda t: -2.0 * np.sign(np.sin(1.3 * t))),
+], ids=["maxwell", "delayed", "coulomb"])  # fmt: skip
+def test_the_force_along_a_given_motion_is_that_of_the_law(term, expected):
+    x, v = np.cos(1.3 * T), -1.3 * np.sin(1.3 * T)
+    plant = lower(jfsm.Structure([1.0], [term]))
+    found = np.asarray(force_along(plant, jnp.asarray(x[:, None]), jnp.asarray(v[:, None]), jnp.asarray(T)))[:, 0]
+    if expected is None:  # settled: amplitude and phase of z' = w - z/tau
+        response = 2.0 * np.real(1j * 1.3 / (1j * 1.3 + 2.0) * np.exp(1j * 1.3 * T))
+        np.testing.assert_allclose(found[200:], response[200:], atol=5e-3)
+    else:
+        np.testing.assert_allclose(found[1:], expected(T)[1:], atol=2e-3)
