@@ -1,7 +1,9 @@
 """Many free runs in one call: other numbers, other starts, the same laws."""
 
+import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from typing import Any
 
 import equinox as eqx
@@ -11,15 +13,15 @@ import numpy as np
 
 from .._types import as_array, require_x64
 from ..records import Record
-from ..structures import Structure
+from ..structures import MapTerm, Structure
 from ._drive import Reconstruction
-from ._excitation import bucket, excitation, force_limits, measured_force, substeps_for, typical_speed
-from ._grid import free_run
-from ._plant import Grid, lower
-from ._simulate import check_pair, motion_bound, with_tables
+from ._excitation import _slope, bucket, excitation, force_limits, measured_force, substeps_for, typical_speed
+from ._grid import Fine, free_run
+from ._plant import Grid, Plant, Slots, lower
+from ._simulate import check_pair, escapes, finer, motion_bound, with_tables
 
-_TOGETHER = 256
-"""Runs in one call of the program."""
+_LANES = (1, 8, 64)
+"""Runs that go side by side in one call of the program; beyond 64 their states leave the processor's cache."""
 
 
 @dataclass(frozen=True)
@@ -53,17 +55,18 @@ def simulate_many(
 ) -> Responses:
     """Free runs of many parameter sets, from many initial states, or both in pairs, under one record's force.
 
-    The runs go side by side on the sample grid, so that a thousand cost little more than ten.
+    The runs go side by side on the sample grid, as ``simulate(..., solver="grid")`` would take each by itself.
 
     Parameters
     ----------
     models : Structure or sequence of them
         Of the same laws at the same places; their numbers may differ.
     record : Record
+        What drives; its response, if any, is not used.
     initial_states : pair of (runs, dof) arrays, optional
         Displacement and velocity at the first sample; rest by default.
     substeps : int, optional
-        Runge-Kutta steps per sample; by default as many as the fastest structure among them needs.
+        Runge-Kutta steps per sample; by default as many as `simulate` takes for the fastest structure among them.
     reconstruction : "band-limited", "linear" or "hold"
         The force between its samples.
 
@@ -82,6 +85,13 @@ def simulate_many(
         raise ValueError("`models` must hold at least one structure; the sequence is empty.")
     for structure in structures:
         check_pair(structure, record)
+    if any(_laws(structure) != _laws(structures[0]) for structure in structures):
+        raise ValueError(
+            "`models` must differ in their numbers only: the same laws and sensor effects at the same places, in the "
+            "same order, with the same maps and the same limits of a clipped force."
+        )
+    if substeps is not None and substeps < 1:
+        raise ValueError(f"`substeps` must be at least 1; got {substeps}.")
     dof = structures[0].dof
     x0, v0 = (np.zeros((1, dof)), np.zeros((1, dof))) if initial_states is None else _states(initial_states, dof)
     runs = max(len(structures), len(x0))
@@ -89,35 +99,29 @@ def simulate_many(
         raise ValueError(
             f"`initial_states` must hold one state, or one for each of the {len(structures)} structures; got {len(x0)}."
         )
-    speed = typical_speed(record)
-    steps = substeps or max(substeps_for(s, record.dt, speed) for s in structures)
-    plants = [lower(with_tables(s), grid=Grid(record.dt, steps)) for s in structures]
-    if len({jax.tree.structure(p) for p in plants}) > 1 or any(_shape(p) != _shape(plants[0]) for p in plants):
-        raise ValueError("`models` must differ in their numbers only: the same laws, at the same places.")
+    speed, asked = typical_speed(record), structures if len(structures) == 1 else _fastest(structures, record)
+    steps = substeps or finer(max(substeps_for(structure, record.dt, speed) for structure in asked))
+    plants = _lowered(structures, Grid(record.dt, steps))
     force = measured_force(record, dof, force_limits(structures[0]))
     fine = excitation(record, dof, steps, reconstruction, length=bucket(len(record)), force=force)
-    stacked = jax.tree.map(
-        lambda *leaves: jnp.stack(leaves) if jnp.issubdtype(leaves[0].dtype, jnp.floating) else leaves[0], *plants
-    )
-    found = [np.zeros((runs, len(record), dof)) for _ in range(3)]
-    for begin in range(0, runs, _TOGETHER):
-        index = np.arange(begin, min(begin + _TOGETHER, runs))
-        lanes = np.resize(index, next(size for size in (1, 16, _TOGETHER) if size >= index.size))
-        plant = _taken(stacked, lanes % len(plants))
+    x, v, a = (np.empty((runs, len(record), dof)) for _ in range(3))
+
+    def together(begin: int) -> None:
+        index = np.arange(begin, min(begin + _LANES[-1], runs))
+        lanes = np.resize(index, next(size for size in _LANES if size >= index.size))
+        plant = _taken(plants, lanes % len(structures))
         start = (jnp.asarray(q[lanes % len(q)]) for q in (x0, v0))
-        for out, values in zip(found, _runs(plant, fine, *start), strict=True):
+        for out, values in zip((x, v, a), _runs(plant, fine, *start), strict=True):
             out[index] = np.asarray(values)[: index.size, : len(record)]
-    escape = np.full(runs, np.inf)
-    for k in range(runs):
-        bound = motion_bound(plants[k % len(plants)], fine, record, x0[k % len(x0)], found[0][k])
-        bad = ~np.all(np.isfinite(found[0][k]) & np.isfinite(found[1][k]) & (np.abs(found[0][k]) < bound), axis=1)
-        if np.any(bad):
-            stop = int(np.argmax(bad))
-            escape[k] = record.time[stop]
-            for out in found:
-                out[k, stop:] = out[k, max(stop - 1, 0)]
-    x, v, a = found
-    return Responses(record.time, x, v, a, escape)
+
+    # The program itself runs on one core: threads give it the others.
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        list(threads.map(together, range(0, runs, _LANES[-1])))
+    escaped = escapes(motion_bound(plants, fine, record, x0, x), x, v)
+    for k in np.flatnonzero(escaped < len(record)):
+        for out in (x, v, a):
+            out[k, escaped[k] :] = out[k, max(escaped[k] - 1, 0)]
+    return Responses(record.time, x, v, a, np.append(record.time, np.inf)[escaped])
 
 
 def _states(initial_states: tuple[Any, Any], dof: int) -> tuple[np.ndarray, np.ndarray]:
@@ -127,21 +131,95 @@ def _states(initial_states: tuple[Any, Any], dof: int) -> tuple[np.ndarray, np.n
     return x0, v0
 
 
-def _shape(plant) -> tuple:
-    """What must be the same in all: the laws in the slots, and where they act."""
-    slots = (plant.smooth, plant.friction, plant.memory, plant.delayed)
-    return tuple((s.kind.tolist(), np.asarray(s.direction).tolist()) for s in slots)
+def _laws(structure: Structure) -> tuple:
+    """What must be the same in all structures: everything but their numbers."""
+    maps = [id(term.force_map) for term in structure.terms if isinstance(term, MapTerm)]
+    parts = [(type(part), part.at) for part in (*structure.terms, *structure.sensors)]
+    return structure.mass.shape, parts, maps, force_limits(structure)
 
 
-def _many(leaf) -> bool:
-    return jnp.issubdtype(leaf.dtype, jnp.floating)
+def _numbers(structure: Structure) -> np.ndarray:
+    """Every number of the terms and sensors, in their order."""
+    parts = (*structure.terms, *structure.sensors)
+    return np.array([float(getattr(part, p.name)) for part in parts for p in part.parameters])
 
 
-def _taken(stacked, index):
-    return jax.tree.map(lambda leaf: leaf[index] if _many(leaf) else leaf, stacked)
+def _with_number(structure: Structure, place: int, value: float) -> Structure:
+    """The structure with one of its `_numbers` replaced."""
+    parts = [*structure.terms, *structure.sensors]
+    owner, name = [(i, p.name) for i, part in enumerate(parts) for p in part.parameters][place]
+    parts[owner] = replace(parts[owner], **{name: value})
+    n = len(structure.terms)
+    return Structure(structure.mass, parts[:n], parts[n:], structure.trust)
+
+
+def _lowered(structures: Sequence[Structure], grid: Grid) -> Plant:
+    """Plants of the structures, with the runs as a leading axis of every array of numbers.
+
+    Lowering a thousand structures one by one would take longer than their runs. A plant is linear in each number, so
+    one more plant per number that varies tells them all.
+    """
+    first = with_tables(structures[0])
+    numbers = np.array([_numbers(structure) for structure in structures])
+    change = numbers - numbers[0]
+    base = lower(first, grid=grid)
+    floating, rest = eqx.partition(base, _is_number)
+    leaves, tree = jax.tree.flatten(floating)
+    stacked = [np.repeat(np.asarray(leaf)[None], len(structures), axis=0) for leaf in leaves]
+    for place in np.flatnonzero(np.any(change != 0, axis=0)):
+        widest = int(np.argmax(np.abs(change[:, place])))
+        other = lower(_with_number(first, int(place), numbers[widest, place]), grid=grid)
+        share = change[:, place] / change[widest, place]
+        for out, leaf, moved in zip(stacked, leaves, jax.tree.leaves(eqx.filter(other, _is_number)), strict=True):
+            out += share.reshape((-1,) + (1,) * leaf.ndim) * np.asarray(moved - leaf)
+    plants = eqx.combine(jax.tree.unflatten(tree, [jnp.asarray(leaf) for leaf in stacked]), rest)
+    masses = np.array([np.asarray(structure.mass) for structure in structures])
+    mass = jnp.asarray(masses[:, :, None] * np.eye(masses.shape[1]) if masses.ndim == 2 else masses)
+    reach = grid.reach([term for structure in structures for term in structure.terms if term.delay is not None])
+    alone = {name: _alone(getattr(plants, name)) for name in ("smooth", "friction", "memory", "delayed")}
+    return replace(plants, mass=mass, reach=reach, **alone)
+
+
+def _alone(slots: Slots) -> Slots:
+    """The same slots with the laws that stand in them for a table: a program of its own, and many times faster."""
+    kinds = slots.kind.tolist()
+    present = list(dict.fromkeys(kinds))
+    if not present:
+        return slots
+    kind = jnp.asarray([present.index(k) for k in kinds], dtype=slots.kind.dtype)
+    return replace(slots, kind=kind, laws=tuple(slots.laws[k] for k in present))
+
+
+def _fastest(structures: Sequence[Structure], record: Record) -> list[Structure]:
+    """Of each measure that the number of steps goes by, the structure that needs most; the rest need not be asked."""
+    plants, speed = _lowered(structures, Grid(record.dt, 1)), typical_speed(record)
+    mass, damping, stiffness = (np.asarray(q) for q in (plants.mass, plants.damping, plants.stiffness))
+    zero, one = np.zeros_like(mass), np.broadcast_to(np.eye(mass.shape[-1]), mass.shape)
+    linear = np.block([[zero, one], [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)]])
+    slopes = [linear]
+    if len(plants.smooth) or len(plants.memory):
+        slopes += [np.asarray(_slopes(plants, jnp.full(mass.shape[-1], v))) for v in (0.0, speed, -speed)]
+    return [structures[int(np.argmax(np.max(np.abs(np.linalg.eigvals(slope)), axis=-1)))] for slope in slopes]
+
+
+def _is_number(leaf: Any) -> bool:
+    return eqx.is_inexact_array(leaf)
+
+
+def _taken(plants: Plant, index: np.ndarray) -> Plant:
+    return jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)[index]) if _is_number(leaf) else leaf, plants)
+
+
+def _axes(plants: Plant) -> Any:
+    return jax.tree.map(lambda leaf: 0 if _is_number(leaf) else None, plants)
 
 
 @eqx.filter_jit
-def _runs(plant, fine, x0, v0):
-    axes = jax.tree.map(lambda leaf: 0 if _many(leaf) else None, plant)
-    return jax.vmap(lambda plant, x0, v0: free_run(plant, fine, x0, v0), in_axes=(axes, 0, 0))(plant, x0, v0)
+def _slopes(plants: Plant, v):
+    return jax.vmap(lambda plant: _slope(plant, jnp.zeros_like(v), v), in_axes=(_axes(plants),))(plants)
+
+
+@eqx.filter_jit
+def _runs(plants: Plant, fine: Fine, x0, v0):
+    axes = _axes(plants)
+    return jax.vmap(lambda plant, x0, v0: free_run(plant, fine, x0, v0), in_axes=(axes, 0, 0))(plants, x0, v0)

@@ -239,7 +239,9 @@ def motion_bound(plant: Plant, fine: Fine, record: Record, x0: np.ndarray, x: np
 
     The plant's matrices, `x0` (..., dof) and `x` (..., n, dof) may have leading axes, one bound for each.
     """
-    measured = max((np.max(np.abs(y)) for (kind, _), y in record.responses.items() if kind == "displacement"), default=0)
+    measured = max(
+        (np.max(np.abs(y)) for (kind, _), y in record.responses.items() if kind == "displacement"), default=0
+    )
     stiffness, mass = (np.max(np.abs(np.asarray(q)), axis=(-2, -1)) for q in (plant.stiffness, plant.mass))
     driving = np.max(np.abs(np.asarray(fine.force))) + mass * np.max(np.abs(np.asarray(fine.base)))
     static = driving / np.where(stiffness > 0, stiffness, mass / record.duration**2)
