@@ -242,17 +242,17 @@ def causes() -> None:
     from .diagnosis import SOUGHT
     from .structures import causes
 
-    rows = [
-        (
-            cause.id,
-            cause.family,
-            ", ".join(p.name for p in cause.effect.parameters),
-            "always" if cause.is_value else "yes" if cause.id in SOUGHT else "if asked",
-            cause.sentence,
-        )
-        for cause in causes().values()
-    ]
-    _table("Causes", ("cause", "family", "parameters", "looked for", "what it is"), rows)
+    for family in dict.fromkeys(cause.family for cause in causes().values()):
+        rows = [
+            (
+                cause.id,
+                "always" if cause.is_value else "yes" if cause.id in SOUGHT else "if asked",
+                f"{', '.join(p.name for p in cause.effect.parameters)}: {cause.sentence}",
+            )
+            for cause in causes().values()
+            if cause.family == family
+        ]
+        _table(family.capitalize(), ("cause", "looked for", "parameters and what it is"), rows)
 
 
 @command
