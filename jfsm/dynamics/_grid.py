@@ -11,9 +11,6 @@ from ._forces import hidden_start
 from ._plant import Plant
 from ._stepper import Load, Motion, acceleration, advance, inverse_mass, mode_at
 
-_UNROLLED = 4
-"""Substeps up to which a smooth step is written out: faster to run, still quick to compile."""
-
 
 class Fine(eqx.Module):
     """What drives a run between consecutive samples: forces on half steps.
@@ -170,11 +167,8 @@ def advance_sample(plant: Plant, minv, motion: Motion, force, base, time, step) 
     """Motion one sample later; `force` (2 substeps + 1, dof) is the load on half steps."""
     substeps = (force.shape[0] - 1) // 2
     h = step / substeps
-    if substeps <= _UNROLLED and not (len(plant.friction) or plant.hidden):
-        for i in range(substeps):
-            nodes = slice(2 * i, 2 * i + 3)
-            motion = advance(plant, minv, motion, Load(force[nodes], base[nodes], time + i * h, h))
-        return motion
+    if substeps == 1:
+        return advance(plant, minv, motion, Load(force, base, time, h))
     forces, bases = (
         jnp.stack([force[:-2:2], force[1:-1:2], force[2::2]], 1),
         jnp.stack([base[:-2:2], base[1:-1:2], base[2::2]], 1),
