@@ -32,7 +32,6 @@ def test_what_comes_back_lies_beyond_the_limit_whatever_the_noise():
 
 
 def test_a_signal_that_never_reaches_the_limit_is_left_alone():
-    assert declipped(tones(), 5.0) is not None
     np.testing.assert_array_equal(declipped(tones(), 5.0), tones())
 
 

@@ -1,12 +1,12 @@
 """What it does: structures lowered to arrays, and their free runs."""
 
+from ._backbone import Backbone as Backbone
+from ._backbone import backbone as backbone
 from ._drive import Reconstruction as Reconstruction
 from ._fixed_points import FixedPoint as FixedPoint
 from ._fixed_points import fixed_points as fixed_points
-from ._harmonic_balance import Backbone as Backbone
-from ._harmonic_balance import ForcedResponse as ForcedResponse
-from ._harmonic_balance import backbone as backbone
-from ._harmonic_balance import forced_response as forced_response
+from ._forced_response import ForcedResponse as ForcedResponse
+from ._forced_response import forced_response as forced_response
 from ._limit_cycles import LimitCycle as LimitCycle
 from ._limit_cycles import limit_cycles as limit_cycles
 from ._linearise import Linearisation as Linearisation

@@ -8,11 +8,13 @@ from jaxtyping import Array, Float
 from ._forces import friction_limits, hidden_rate, hidden_start, settle, smooth_force
 from ._grid import delayed_along
 from ._plant import Plant
+from ._stepper import runge_kutta
 
 _SUBSTEPS = 4
 """Steps of a hidden state per sample; the motion is straight in between."""
 
 
+@eqx.filter_jit
 def force_along(
     plant: Plant, x: Float[Array, "n dof"], v: Float[Array, "n dof"], time: Float[Array, " n"]
 ) -> Float[Array, "n dof"]:
@@ -37,7 +39,7 @@ def force_along(
 def _hidden_along(plant: Plant, x, v, time, step):
     if not plant.hidden:
         return jnp.zeros((x.shape[0], 0))
-    h, zero = step / _SUBSTEPS, jnp.zeros(())
+    zero = jnp.zeros(())
 
     def sample(z, inputs):
         x0, x1, v0, v1, t = inputs
@@ -46,19 +48,11 @@ def _hidden_along(plant: Plant, x, v, time, step):
             return hidden_rate(plant, x0 + s * (x1 - x0), v0 + s * (v1 - v0), z, t + s * step, zero)
 
         def substep(z, i):
-            s = i / _SUBSTEPS
-            half = 0.5 / _SUBSTEPS
-            r1 = rate(z, s)
-            r2 = rate(z + h / 2 * r1, s + half)
-            r3 = rate(z + h / 2 * r2, s + half)
-            r4 = rate(z + h * r3, s + 2 * half)
-            at = x0 + (s + 2 * half) * (x1 - x0)
-            return settle(plant, at, z + h / 6 * (r1 + 2 * r2 + 2 * r3 + r4)), None
+            begin, end = i / _SUBSTEPS, (i + 1) / _SUBSTEPS
+            after = runge_kutta(rate, z, step / _SUBSTEPS, (begin, (begin + end) / 2, end))
+            return settle(plant, x0 + end * (x1 - x0), after), None
 
         return jax.lax.scan(substep, z, jnp.arange(_SUBSTEPS))[0], z
 
     last, z = jax.lax.scan(sample, hidden_start(plant, x[0], v[0]), (x[:-1], x[1:], v[:-1], v[1:], time[:-1]))
     return jnp.concatenate([z, last[None, :]])
-
-
-run_force_along = eqx.filter_jit(force_along)

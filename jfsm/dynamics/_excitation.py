@@ -4,17 +4,16 @@ import math
 from collections.abc import Mapping
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from ..records import Record, declipped, silent_forces
 from ..structures import Clipping, LinearDamping, LinearStiffness, Structure
 from ._drive import Reconstruction, reconstruct
-from ._forces import hidden_rate, hidden_start
+from ._forces import hidden_start
 from ._grid import Fine
 from ._plant import Plant, lower
-from ._stepper import free_acceleration, inverse_mass
+from ._stepper import inverse_mass, jacobian
 
 _STEP_ANGLE = 0.22
 """Largest angle of the fastest mode per step [rad]: Runge-Kutta of order four then shifts a frequency by 2e-5."""
@@ -75,19 +74,13 @@ def substeps_for(structure: Structure, dt: float, speed: float = 0.0) -> int:
 def _fastest_rate(plant: Plant, v: np.ndarray) -> float:
     """Largest eigenvalue [rad/s] of a plant's motion about x = 0 at velocity `v`; friction that sticks is left out."""
     dof = plant.dof
-    return float(np.max(np.abs(np.linalg.eigvals(np.asarray(_slope(plant, jnp.zeros(dof), jnp.asarray(v)))))))
+    return float(np.max(np.abs(np.linalg.eigvals(np.asarray(relaxed_jacobian(plant, jnp.zeros(dof), jnp.asarray(v)))))))
 
 
 @eqx.filter_jit
-def _slope(plant: Plant, x, v):
-    dof, minv, zero = plant.dof, inverse_mass(plant), jnp.zeros(())
-
-    def rate(state):
-        x, v, z = state[:dof], state[dof : 2 * dof], state[2 * dof :]
-        a = free_acceleration(plant, minv, x, v, z, jnp.zeros(dof), zero)
-        return jnp.concatenate([v, a, hidden_rate(plant, x, v, z, zero, zero)])
-
-    return jax.jacfwd(rate)(jnp.concatenate([x, v, hidden_start(plant, x, v)]))
+def relaxed_jacobian(plant: Plant, x, v):
+    """Derivative of the rate of the state by the state, hidden states relaxed and friction left out."""
+    return jacobian(plant, inverse_mass(plant), x, v, hidden_start(plant, x, v), jnp.zeros(()))
 
 
 def typical_speed(record: Record) -> float:

@@ -111,7 +111,7 @@ def delayed_force(plant: Plant, minv, motion: Motion, past: Past, g, time, step)
         inside = (lag < 0)[:, None]
         s = -lag[:, None] * step
         start = past.x[-1:, :]
-        d_past = jnp.where(early, start, value @ x + slope @ v)
+        d_past = jnp.where(early, start, _blend(value, x) + _blend(slope, v))
         d_now = motion.x[None, :] + s * motion.v[None, :] + s**2 / 2 * a[None, :]
         w_now = motion.v[None, :] + s * a[None, :]
         moved = jnp.where(inside, d_now, d_past)

@@ -15,7 +15,7 @@ from .._types import as_array, require_x64
 from ..records import Record
 from ..structures import MapTerm, Structure
 from ._drive import Reconstruction
-from ._excitation import _slope, bucket, excitation, force_limits, measured_force, substeps_for, typical_speed
+from ._excitation import bucket, excitation, force_limits, measured_force, relaxed_jacobian, substeps_for, typical_speed
 from ._grid import Fine, free_run
 from ._plant import Grid, Plant, Slots, lower
 from ._simulate import check_pair, escapes, finer, motion_bound, with_tables
@@ -198,7 +198,7 @@ def _fastest(structures: Sequence[Structure], record: Record) -> list[Structure]
     linear = np.block([[zero, one], [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)]])
     slopes = [linear]
     if len(plants.smooth) or len(plants.memory):
-        slopes += [np.asarray(_slopes(plants, jnp.full(mass.shape[-1], v))) for v in (0.0, speed, -speed)]
+        slopes += [np.asarray(_jacobians(plants, jnp.full(mass.shape[-1], v))) for v in (0.0, speed, -speed)]
     return [structures[int(np.argmax(np.max(np.abs(np.linalg.eigvals(slope)), axis=-1)))] for slope in slopes]
 
 
@@ -215,8 +215,8 @@ def _axes(plants: Plant) -> Any:
 
 
 @eqx.filter_jit
-def _slopes(plants: Plant, v):
-    return jax.vmap(lambda plant: _slope(plant, jnp.zeros_like(v), v), in_axes=(_axes(plants),))(plants)
+def _jacobians(plants: Plant, v):
+    return jax.vmap(lambda plant: relaxed_jacobian(plant, jnp.zeros_like(v), v), in_axes=(_axes(plants),))(plants)
 
 
 @eqx.filter_jit

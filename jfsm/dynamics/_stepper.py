@@ -50,14 +50,29 @@ def inverse_mass(plant: Plant) -> Float[Array, "dof dof"]:
     return 1.0 / plant.mass if plant.dof == 1 else jnp.linalg.inv(plant.mass)
 
 
-def _times(matrix, vector):
+def times(matrix, vector):
+    """Product of a small matrix and a vector."""
     # Written as a sum: a matrix product of this size would leave the fused loop of the compiled step.
     return jnp.sum(matrix * vector[None, :], 1)
 
 
 def free_acceleration(plant: Plant, minv, x, v, z, g, t):
     """Acceleration without friction."""
-    return _times(minv, g - smooth_force(plant, x, v, z, t))
+    return times(minv, g - smooth_force(plant, x, v, z, t))
+
+
+def jacobian(plant: Plant, minv, x, v, z, t) -> Float[Array, "state state"]:
+    """Derivative of the rate of (x, v, z) by (x, v, z), friction left out and the base at rest."""
+    dof, none = plant.dof, jnp.zeros(plant.dof)
+
+    def rate(state):
+        x, v, z = state[:dof], state[dof : 2 * dof], state[2 * dof :]
+        a = free_acceleration(plant, minv, x, v, z, none, t)
+        return jnp.concatenate([v, a, hidden_rate(plant, x, v, z, t, jnp.zeros(()))])
+
+    state = jnp.concatenate([x, v, z])
+    push = jax.vmap(lambda e: jax.jvp(rate, (state,), (e,))[1])
+    return push(jnp.eye(state.size)).T
 
 
 def holding_force(plant: Plant, minv, a, sticking):
@@ -82,9 +97,9 @@ def acceleration(plant: Plant, minv, x, v, z, mode, g, t):
     low, high = friction_limits(plant, x, v, t)
     rows = plant.friction.direction
     sliding = jnp.where(mode > 0, high, jnp.where(mode < 0, low, 0.0))
-    a = a - _times(minv, jnp.sum(rows * sliding[:, None], 0))
+    a = a - times(minv, jnp.sum(rows * sliding[:, None], 0))
     held = holding_force(plant, minv, a, mode == 0)
-    a = a - _times(minv, jnp.sum(rows * held[:, None], 0))
+    a = a - times(minv, jnp.sum(rows * held[:, None], 0))
     margin = jnp.where(mode == 0, jnp.minimum(high - held, held - low), mode * jnp.sum(rows * v[None, :], 1))
     return a, margin
 
@@ -103,30 +118,46 @@ def _from_rest(plant: Plant, minv, x, v, z, g, t, mode, broken):
     rows, rest = plant.friction.direction, mode == 0
     low, high = friction_limits(plant, x, v, t)
     sliding = jnp.where(mode > 0, high, jnp.where(mode < 0, low, 0.0))
-    a = free_acceleration(plant, minv, x, v, z, g, t) - _times(minv, jnp.sum(rows * sliding[:, None], 0))
+    a = free_acceleration(plant, minv, x, v, z, g, t) - times(minv, jnp.sum(rows * sliding[:, None], 0))
     held = holding_force(plant, minv, a, rest)
     low, high = jnp.where(broken, (low + high) / 2, low), jnp.where(broken, (low + high) / 2, high)
     return jnp.where(rest, jnp.where(held > high, 1.0, jnp.where(held < low, -1.0, 0.0)), mode)
 
 
-def _runge_kutta(plant: Plant, minv, x, v, z, mode, load: Load, start, share):
-    """State after `share` of the step from `start` (both shares of the whole step), in a frozen mode."""
-    h = share * load.step
-    t = load.time + start * load.step
-    g0, g1, g2 = (load.at(start), load.at(start + share / 2), load.at(start + share))
+def runge_kutta(rate, y, h, nodes):
+    """`y`, a tree of arrays, one step `h` on: the method of order four.
 
-    def slope(x, v, z, g, base, t):
+    `rate(y, node)` is its rate at the beginning, the middle and the end of the step, which are the three `nodes`.
+    """
+
+    def along(share, slope):
+        return jax.tree.map(lambda y, r: y + share * r, y, slope)
+
+    begin, middle, end = nodes
+    k1 = rate(y, begin)
+    k2 = rate(along(h / 2, k1), middle)
+    k3 = rate(along(h / 2, k2), middle)
+    k4 = rate(along(h, k3), end)
+    return jax.tree.map(lambda y, a, b, c, d: y + h / 6 * (a + 2 * b + 2 * c + d), y, k1, k2, k3, k4)
+
+
+def _in_mode(plant: Plant, minv, x, v, z, mode, load: Load, start, share):
+    """State after `share` of the step from `start` (both shares of the whole step), in a frozen mode."""
+    first, last = load.time + start * load.step, load.time + (start + share) * load.step
+    middle = load.time + (start + share / 2) * load.step
+    # The base's inertia is part of the force; what hidden masses feel of it is taken at the three nodes.
+    nodes = (
+        (load.at(start), load.base[0], first),
+        (load.at(start + share / 2), load.base[1], middle),
+        (load.at(start + share), load.base[2], last),
+    )
+
+    def rate(state, node):
+        (x, v, z), (g, base, t) = state, node
         return v, acceleration(plant, minv, x, v, z, mode, g, t)[0], hidden_rate(plant, x, v, z, t, base)
 
-    # The base's inertia is part of the force; what hidden masses feel of it is taken at the three nodes.
-    b0, b1, b2 = load.base[0], load.base[1], load.base[2]
-    v1, a1, r1 = slope(x, v, z, g0, b0, t)
-    v2, a2, r2 = slope(x + h / 2 * v1, v + h / 2 * a1, z + h / 2 * r1, g1, b1, t + h / 2)
-    v3, a3, r3 = slope(x + h / 2 * v2, v + h / 2 * a2, z + h / 2 * r2, g1, b1, t + h / 2)
-    v4, a4, r4 = slope(x + h * v3, v + h * a3, z + h * r3, g2, b2, t + h)
-    x = x + h / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
-    v = v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
-    return x, v, settle(plant, x, z + h / 6 * (r1 + 2 * r2 + 2 * r3 + r4))
+    x, v, z = runge_kutta(rate, (x, v, z), share * load.step, nodes)
+    return x, v, settle(plant, x, z)
 
 
 def advance(plant: Plant, minv, motion: Motion, load: Load) -> Motion:
@@ -134,12 +165,12 @@ def advance(plant: Plant, minv, motion: Motion, load: Load) -> Motion:
     x, v, z, mode = motion
     zero, one = jnp.zeros(()), jnp.ones(())
     if not len(plant.friction):
-        return Motion(*_runge_kutta(plant, minv, x, v, z, mode, load, zero, one), mode)
+        return Motion(*_in_mode(plant, minv, x, v, z, mode, load, zero, one), mode)
 
     def segment(carry, last):
         x, v, z, mode, start = carry
         left = 1.0 - start
-        xe, ve, ze = _runge_kutta(plant, minv, x, v, z, mode, load, start, left)
+        xe, ve, ze = _in_mode(plant, minv, x, v, z, mode, load, start, left)
         ended = (acceleration(plant, minv, xe, ve, ze, mode, load.at(one), load.time + load.step)[1] < 0) & ~last
         path = _path(plant, minv, (x, v, z), (xe, ve, ze), mode, load, start, left)
         shares = jnp.where(ended, _event(plant, minv, path, mode, load, start, left), 1.0)

@@ -13,10 +13,20 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..dynamics._forces import friction_limits, hidden_rate, settle, smooth_force
+from ..dynamics._forces import friction_limits, settle
 from ..dynamics._grid import Fine, advance_sample, begin, load_of, punctual, remember
 from ..dynamics._plant import Plant, Readout
-from ..dynamics._stepper import Load, Motion, acceleration, advance, holding_force, inverse_mass, mode_at
+from ..dynamics._stepper import (
+    Load,
+    Motion,
+    acceleration,
+    advance,
+    free_acceleration,
+    holding_force,
+    inverse_mass,
+    jacobian,
+    mode_at,
+)
 
 _HALVINGS = 3
 """Hidden states may relax fast: the series is taken for an eighth of the sample, and squared back."""
@@ -111,35 +121,17 @@ def innovations(
     return jax.lax.scan(body, (motion, past, start.covariance), inputs)[1]
 
 
-def _rates(plant, minv, state, t):
-    """Acceleration without friction and rate of the hidden states, as functions of the state alone."""
-    dof = plant.dof
-    x, v, z = state[:dof], state[dof : 2 * dof], state[2 * dof :]
-    zero = jnp.zeros(())
-    return jnp.concatenate([-_times(minv, smooth_force(plant, x, v, z, t)), hidden_rate(plant, x, v, z, t, zero)])
-
-
-def _times(matrix, vector):
-    return jnp.sum(matrix * vector[None, :], 1)
-
-
-def _slopes(plant, minv, state, t):
-    """Derivative of `_rates` by the state, (dof + hidden, state)."""
-    push = jax.vmap(lambda e: jax.jvp(lambda s: _rates(plant, minv, s, t), (state,), (e,))[1])
-    return push(jnp.eye(state.size)).T
-
-
 def _transition(plant, minv, before: Motion, after: Motion, time, dt):
     """Derivative of the state after a sample by the state before it: exponential series of the mid-point slope."""
     dof, hidden = plant.dof, plant.hidden
-    middle = jnp.concatenate([(a + b) / 2 for a, b in zip(before[:3], after[:3], strict=True)])
-    slopes = _slopes(plant, minv, middle, time + dt / 2)
-    top = jnp.concatenate([jnp.zeros((dof, dof)), jnp.eye(dof), jnp.zeros((dof, hidden))], 1)
-    held = _held(plant, minv, slopes[:dof], (before.mode == 0) & (after.mode == 0))
+    x, v, z = ((a + b) / 2 for a, b in zip(before[:3], after[:3], strict=True))
+    rates = jacobian(plant, minv, x, v, z, time + dt / 2)
+    held = _held(plant, minv, rates[dof : 2 * dof], (before.mode == 0) & (after.mode == 0))
     halvings = _HALVINGS if hidden else 0
-    slope = dt / 2**halvings * jnp.concatenate([top, held, slopes[dof:]], 0)
-    square = _product(slope, slope)
-    step = jnp.eye(slope.shape[0]) + slope + square / 2 + _product(square, slope) / 6 + _product(square, square) / 24
+    exponent = dt / 2**halvings * jnp.concatenate([rates[:dof], held, rates[2 * dof :]], 0)
+    square = _product(exponent, exponent)
+    cube, fourth = _product(square, exponent), _product(square, square)
+    step = jnp.eye(exponent.shape[0]) + exponent + square / 2 + cube / 6 + fourth / 24
     for _ in range(halvings):
         step = _product(step, step)
     if not hidden:
@@ -200,10 +192,10 @@ def _predict(plant, minv, show, c, mean, covariance, mode, load: Load, y, varian
     if show.kinds[c] == "velocity":
         return jnp.sum(select * mean[dof : 2 * dof]), jnp.concatenate([none, select, hidden])
     if len(plant.friction) == 1:
-        a, slope = _most_probable_mode(plant, minv, select, c, mean, covariance, load, y, variance, gain)
+        a, by_state = _most_probable_mode(plant, minv, select, c, mean, covariance, load, y, variance, gain)
     else:
-        a, slope = _acceleration_and_slope(plant, minv, mean, mode, load)
-    return jnp.sum(select * (a + load.base[0])), jnp.sum(select[:, None] * slope, 0)
+        a, by_state = _acceleration_and_slope(plant, minv, mean, mode, load)
+    return jnp.sum(select * (a + load.base[0])), jnp.sum(select[:, None] * by_state, 0)
 
 
 def _late(plant, minv, show, c, mean, mode, load: Load):
@@ -236,18 +228,19 @@ def _acceleration_and_slope(plant, minv, mean, mode, load: Load):
     dof = plant.dof
     x, v, z = mean[:dof], mean[dof : 2 * dof], mean[2 * dof :]
     a = acceleration(plant, minv, x, v, z, mode, load.force[0], load.time)[0]
-    return a, _held(plant, minv, _slopes(plant, minv, mean, load.time)[:dof], mode == 0)
+    return a, _held(plant, minv, jacobian(plant, minv, x, v, z, load.time)[dof : 2 * dof], mode == 0)
 
 
-def _held(plant, minv, slope, sticking):
+def _held(plant, minv, by_state, sticking):
     """Derivative of the accelerations by the state once links stick: what would move those is taken up."""
     for i in range(len(plant.friction)):
         row = plant.friction.direction[i]
         effect = jnp.sum(minv * row[None, :], 1)
         scale = jnp.sum(row * effect)
-        held = slope - effect[:, None] * jnp.sum(row[:, None] * slope, 0)[None, :] / jnp.where(scale > 0, scale, 1.0)
-        slope = jnp.where(sticking[i] & (scale > 0), held, slope)
-    return slope
+        along = jnp.sum(row[:, None] * by_state, 0) / jnp.where(scale > 0, scale, 1.0)
+        held = by_state - effect[:, None] * along[None, :]
+        by_state = jnp.where(sticking[i] & (scale > 0), held, by_state)
+    return by_state
 
 
 def _most_probable_mode(plant, minv, select, c, mean, covariance, load: Load, y, variance, gain):
@@ -259,7 +252,7 @@ def _most_probable_mode(plant, minv, select, c, mean, covariance, load: Load, y,
     spread = jnp.sqrt(jnp.maximum(jnp.sum(row[:, None] * covariance[dof : 2 * dof, dof : 2 * dof] * row[None, :]), 0.0))
     certain = jnp.where(spread > 0, speed / jnp.where(spread > 0, spread, 1.0), jnp.sign(speed) * 40.0)
     low, high = friction_limits(plant, x, jnp.zeros(dof), load.time)
-    free = _times(minv, load.force[0] - smooth_force(plant, x, v, z, load.time))
+    free = free_acceleration(plant, minv, x, v, z, load.force[0], load.time)
     held = holding_force(plant, minv, free, jnp.ones(1, bool))[0]
     can_stick = (held <= high[0]) & (held >= low[0])
     weights = (
@@ -269,11 +262,11 @@ def _most_probable_mode(plant, minv, select, c, mean, covariance, load: Load, y,
     )
 
     def judge(mode, weight):
-        a, slope = _acceleration_and_slope(plant, minv, mean, mode[None], load)
-        line = gain * jnp.sum(select[:, None] * slope, 0)
+        a, by_state = _acceleration_and_slope(plant, minv, mean, mode[None], load)
+        line = gain * jnp.sum(select[:, None] * by_state, 0)
         total = jnp.sum(line[:, None] * covariance * line[None, :]) + variance
         error = y - gain * jnp.sum(select * (a + load.base[0])) - plant.channel_offset[c]
-        return weight - error**2 / (2 * total) - jnp.log(total) / 2, a, slope
+        return weight - error**2 / (2 * total) - jnp.log(total) / 2, a, by_state
 
     scores, values, slopes = jax.vmap(judge)(jnp.array([1.0, -1.0, 0.0]), jnp.stack(weights))
     best = jax.nn.one_hot(jnp.argmax(jax.lax.stop_gradient(scores)), 3)

@@ -17,7 +17,7 @@ import numpy as np
 import scipy.linalg
 from jaxtyping import Array, Float
 
-from ..dynamics._along import run_force_along
+from ..dynamics._along import force_along
 from ..dynamics._grid import Fine
 from ..dynamics._plant import Plant, Readout
 
@@ -100,7 +100,7 @@ def latent_force(
     mean, std = (np.asarray(out) for out in _smooth(best, *data))
     dof = plant.dof
     x, v, r = mean[:, :dof], mean[:, dof : 2 * dof], mean[:, 2 * dof :]
-    known = np.asarray(run_force_along(plant, jnp.asarray(x), jnp.asarray(v), fine.time[:n]))
+    known = np.asarray(force_along(plant, jnp.asarray(x), jnp.asarray(v), fine.time[:n]))
     return Latent(x, v, r - known, std[:, 2 * dof :])
 
 

@@ -113,7 +113,7 @@ def place(
     spread = np.maximum(latent.force.std(0), 1e-300)
     rows = _numbers(law, scale, sides)
     forces = np.concatenate([_forces(law, lot, structure, motion, len(chunk)) for chunk, lot in _lots(kind, rows)])
-    beside = [np.asarray(_along(lower(Structure(structure.mass, [t])), *motion)) for t in others]
+    beside = [np.asarray(force_along(lower(Structure(structure.mass, [t])), *motion)) for t in others]
     basis, doubt = _basis(latent, structure, beside)
     basis = basis / np.tile(spread, n)[:, None]
     wanted = (latent.force / spread).ravel()
@@ -180,11 +180,6 @@ def _along_each(plant: Plant, name: str, numbers, x, v, time):
         return force_along(eqx.tree_at(lambda p: getattr(p, name).parameters, plant, row), x, v, time)
 
     return jax.lax.map(one, numbers, batch_size=16)
-
-
-@eqx.filter_jit
-def _along(plant: Plant, x, v, time):
-    return force_along(plant, x, v, time)
 
 
 def _regressed(columns: np.ndarray, wanted: np.ndarray, basis: np.ndarray):

@@ -86,14 +86,10 @@ class Cause(NamedTuple):
         ValueError
             If a parameter has the sign of another cause.
         """
-        names = [p.name for p in self.effect.parameters]
-        if set(parameters) != set(names):
-            raise TypeError(f"{self.id} takes {', '.join(names)}; got {', '.join(parameters) or 'nothing'}.")
-        first = parameters[names[0]]
+        name, first = self._first(parameters)
         if self.sign and math.copysign(1, first) != self.sign:
-            raise ValueError(
-                f"`{names[0]}` of {self.id} must be {'positive' if self.sign > 0 else 'negative'}; got {first}."
-            )
+            must = "positive" if self.sign > 0 else "negative"
+            raise ValueError(f"`{name}` of {self.id} must be {must}; got {first}.")
         return self.effect(**parameters, at=at)
 
     def apply(self, model: Structure, at: tuple, **parameters: float) -> Structure:
@@ -112,10 +108,14 @@ class Cause(NamedTuple):
             raise ValueError(
                 f"`at` of {self.id} must be where the model has one; got {at}, it has {', '.join(model.values())}."
             )
+        return model.with_values({paths[0]: self._first(parameters)[1]})
+
+    def _first(self, parameters: Mapping[str, float]) -> tuple[str, float]:
+        """Name and value of the first number, once all names are the effect's own."""
         names = [p.name for p in self.effect.parameters]
-        if list(parameters) != names:
-            raise TypeError(f"{self.id} takes {names[0]}; got {', '.join(parameters) or 'nothing'}.")
-        return model.with_values({paths[0]: parameters[names[0]]})
+        if set(parameters) != set(names):
+            raise TypeError(f"{self.id} takes {', '.join(names)}; got {', '.join(parameters) or 'nothing'}.")
+        return names[0], parameters[names[0]]
 
 
 class _Mass:

@@ -45,10 +45,7 @@ class AbstractSensor(eqx.Module):
         if self.at[0] not in self.channels or self.at[1] < 1:
             kinds = " or ".join(self.channels)
             raise ValueError(f"`at` of {self.kind} must be ({kinds}, degree of freedom from 1); got {self.at!r}.")
-        parameter = self.parameters[0]
-        if self.value < parameter.least:
-            must = "be positive" if parameter.least > 0 else "not be negative"
-            raise ValueError(f"`{parameter.name}` of {self.kind} must {must}; got {self.value:g}.")
+        self.parameters[0].check(self.value, self.kind)
 
 
 class ForceGain(AbstractSensor):

@@ -38,6 +38,13 @@ class Parameter(NamedTuple):
     free: bool = True
     words: str = ""
 
+    def check(self, value: Any, owner: str) -> None:
+        """Refuse a value below `least`; one that is being traced cannot be looked at."""
+        if isinstance(value, Tracer) or float(value) >= self.least:
+            return
+        must = "be positive" if self.least > 0 else "not be negative"
+        raise ValueError(f"`{self.name}` of {owner} must {must}; got {float(value):g}.")
+
     def unit(self, force: str = "N", length: str = "m", time: str = "s") -> str:
         """The unit in words, ``"N/m^3"``, from the record's unit of force and of length."""
         if self.words:
@@ -112,11 +119,7 @@ class AbstractTerm(eqx.Module):
 
     def __check_init__(self):
         for parameter in self.parameters:
-            value = getattr(self, parameter.name)
-            if isinstance(value, Tracer) or float(value) >= parameter.least:
-                continue  # a traced value cannot be looked at; a fit keeps it within its bounds
-            must = "be positive" if parameter.least > 0 else "not be negative"
-            raise ValueError(f"`{parameter.name}` of {self.kind} must {must}; got {float(value):g}.")
+            parameter.check(getattr(self, parameter.name), self.kind)
 
     @abc.abstractmethod
     def force(self, d: Scalar, w: Scalar, z: Any, t: Scalar) -> Scalar:
