@@ -242,3 +242,16 @@ def test_a_spring_between_two_masses_on_a_moving_base_is_found_from_acceleration
         low, high = found.intervals[path]
         assert abs(found.values[path] - value) < high - low, path
         assert high - low < 0.2 * value, path
+
+
+def test_two_stiffnesses_that_only_their_difference_is_known_of_are_said_to_be_so():
+    t = np.arange(2000) * 0.05
+    force = 4 * np.sin(0.9 * t) + 2 * np.sin(2.3 * t + 1)
+    wells = jfsm.Structure.sdof(1.0, 4.0, 0.2) + jfsm.DoubleWell(6.0, 3.0, at=(0, 1))
+    run = jfsm.simulate(wells, jfsm.Record(t, force), (0.8, 0.0))
+    rng = np.random.default_rng(5)
+    x = run.displacement[:, 0]
+    record = jfsm.Record(t, force, x + 0.005 * np.std(x) * rng.standard_normal(x.size))
+    words = jfsm.fit(wells, record, fixed="mass").identifiability
+    tied = [w for w in words if "cannot be told apart" in w]
+    assert len(tied) == 1 and "double_well@0-1.k_neg - stiffness@0-1.k can" in tied[0]

@@ -147,8 +147,8 @@ def test_two_lanes_are_what_each_of_them_is_alone(chain_nuisances, smooth):
 
 
 def test_more_starts_than_lanes_are_refused(chain_nuisances, smooth):
-    with pytest.raises(ValueError, match=r"At most 2 starts fit into one call; got 3\."):
-        Posterior(together(*[smooth.hypothesis] * 3), [chain_nuisances])
+    with pytest.raises(ValueError, match=r"At most 4 starts fit into one call; got 5\."):
+        Posterior(together(*[smooth.hypothesis] * 5), [chain_nuisances])
 
 
 def test_the_likelihoods_of_two_records_add_up(chain_nuisances, smooth):
@@ -211,3 +211,20 @@ def test_records_of_like_length_share_a_program_wherever_they_end(chain_nuisance
     longer = prepare(noisy_record(MODEL, n=N + 5), MODEL)
     Posterior(hypothesis(MODEL, CUBIC, longer), [longer]).evaluate(smooth.initial())
     assert not traces
+
+
+def test_steps_are_short_enough_for_the_stiffest_structure_asked_for_and_the_drive_stays_the_same(chain_nuisances):
+    stiff = MODEL + jfsm.LuGre(1.0, 1.0, 0.1, 2000.0, 20.0, at=(0, 1))
+    assert chain_nuisances.resolving([MODEL, MODEL + jfsm.CubicStiffness(2.0, at=(0, 1))]) is chain_nuisances
+    finer = chain_nuisances.resolving([MODEL, stiff])
+    assert finer.fine.substeps >= 4 * chain_nuisances.fine.substeps
+    coarse, fine = (np.asarray(n.fine.force) for n in (chain_nuisances, finer))
+    every = (fine.shape[1] - 1) // (coarse.shape[1] - 1)
+    np.testing.assert_allclose(fine[: N - 1, ::every], coarse[: N - 1], atol=1e-9 * np.max(np.abs(coarse)))
+    assert finer.readings is chain_nuisances.readings
+
+
+def test_the_start_is_first_guessed_from_what_is_measured(chain_nuisances):
+    first = np.asarray(chain_nuisances.readings.values)[0]
+    shown = [first[i] for i, (kind, _) in enumerate(chain_nuisances.channels) if kind == "displacement"]
+    np.testing.assert_array_equal(chain_nuisances.x0, shown)

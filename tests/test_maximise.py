@@ -1,9 +1,13 @@
-"""Steps of the climb: damped, and confined to bounds without losing what the others can gain."""
+"""The climb: its steps, damped and confined to bounds without losing what the others can gain, and its valleys."""
+
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from jfsm.identification._maximise import _steps
+from jfsm._result import Result
+from jfsm.identification import Unknown
+from jfsm.identification._maximise import _climb, _Place, _steps
 
 F = np.array([[4.0, 3.0, 0.5], [3.0, 5.0, -1.0], [0.5, -1.0, 2.0]])
 G = np.array([-10.0, 4.0, -6.0])
@@ -12,7 +16,8 @@ LINEAR = np.zeros((1, 3), bool)
 
 
 def step(theta, low, high, log=LINEAR):
-    moves, promises = _steps(theta[None], G[None], F[None], np.array([0.0]), low, high, log)
+    place = _Place(theta[None], np.zeros(1), G[None], F[None])
+    moves, promises = _steps(place, np.array([0.0]), low, high, log)
     return moves[0], promises[0]
 
 
@@ -44,3 +49,24 @@ def test_at_a_bound_that_the_gradient_presses_on_only_the_others_move():
 def test_no_logarithm_changes_by_more_than_one_in_a_step():
     found, _ = step(np.zeros(3), -WIDE, WIDE, np.array([[True, False, False]]))
     assert abs(found[0]) == pytest.approx(1.0)
+
+
+class Valley:
+    """Minus log-posterior with a narrow valley that bends: the sum of two exponentials is known well, little else."""
+
+    def __init__(self):
+        names = ("a.k", "b.k")
+        self.hypothesis = SimpleNamespace(unknowns=(tuple(Unknown(n, 0.0, 1.0, True, 0.0, 1.0) for n in names),))
+
+    def evaluate(self, theta, slack=0.0, most=None):
+        a, b = theta[0]
+        residuals = np.array([1e3 * (np.exp(a) + np.exp(b) - 2.0), a + 1.5])
+        slopes = np.array([[1e3 * np.exp(a), 1e3 * np.exp(b)], [1.0, 0.0]])
+        return np.array([0.5 * residuals @ residuals]), (slopes.T @ residuals)[None], (slopes.T @ slopes)[None]
+
+
+def test_a_narrow_valley_that_bends_is_followed_to_its_end():
+    valley = Valley()
+    found = _climb(valley, np.array([[0.5, np.log(2 - np.exp(0.5))]]), 0.0, 200, 1e-6)  # pyright: ignore[reportArgumentType]
+    assert found.results[0] == Result.successful
+    np.testing.assert_allclose(found.theta[0], [-1.5, np.log(2 - np.exp(-1.5))], atol=1e-3)

@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..dynamics import lower
-from ..identification import LANES, Maximum, Nuisances, Posterior, approach, finish
-from ..structures import AbstractFriction, Structure
+from ..identification import Maximum, Nuisances, Posterior, approach, finish, lanes_of
+from ..structures import Structure
 from ._candidates import Candidate, hypothesis
 from ._trial import Trial, trial
 
@@ -38,7 +37,7 @@ def fit_model(name: str, model: Structure, records: Sequence[Nuisances], until: 
     One comes down the ladder, for values that are far off; one begins at the values as given, for a model that lacks
     something, whose top rungs lead astray.
     """
-    both = 1 if lower(model).friction.kind.size else LANES
+    both = min(2, lanes_of(model))
     posterior = Posterior(hypothesis(model, [model] * both, records, refit=refit), records, until)
     rung = approach(posterior)
     theta = np.vstack([rung.theta[:1], posterior.initial()[1:]])
@@ -63,8 +62,8 @@ def groups(tried: Sequence[Candidate], own: Mapping[str, float] | None) -> list[
         lot = by_law.setdefault(candidate.cause.effect, [])
         lot += [(candidate, s, begin) for begin in begins for s in candidate.starts]
     lots = []
-    for law, starts in by_law.items():
-        lanes = 1 if issubclass(law, AbstractFriction) else LANES
+    for starts in by_law.values():
+        lanes = lanes_of(starts[0][1])
         lots += [starts[i : i + lanes] for i in range(0, len(starts), lanes)]
     return lots
 
@@ -106,6 +105,7 @@ def search(
 
 def _approach(lot: Sequence[Beginning], model: Structure, records, until) -> _Approached:
     candidates, starts, begins = zip(*lot, strict=True)
+    records = [n.resolving(starts) for n in records]
     posterior = Posterior(hypothesis(model, starts, records, begins=begins), records, until)
     return _Approached(candidates, posterior, approach(posterior, _LADDER))
 

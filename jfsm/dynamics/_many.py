@@ -15,7 +15,16 @@ from .._types import as_array, require_x64
 from ..records import Record
 from ..structures import MapTerm, Structure
 from ._drive import Reconstruction
-from ._excitation import bucket, excitation, force_limits, measured_force, relaxed_jacobian, substeps_for, typical_speed
+from ._excitation import (
+    CREST,
+    bucket,
+    excitation,
+    force_limits,
+    measured_force,
+    relaxed_jacobian,
+    substeps_for,
+    typical_speed,
+)
 from ._grid import Fine, free_run
 from ._plant import Grid, Plant, Slots, lower
 from ._simulate import check_pair, escapes, finer, motion_bound, with_tables
@@ -198,7 +207,8 @@ def _fastest(structures: Sequence[Structure], record: Record) -> list[Structure]
     linear = np.block([[zero, one], [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)]])
     slopes = [linear]
     if len(plants.smooth) or len(plants.memory):
-        slopes += [np.asarray(_jacobians(plants, jnp.full(mass.shape[-1], v))) for v in (0.0, speed, -speed)]
+        speeds = speed * np.array([0.0, 1.0, -1.0, CREST, -CREST])
+        slopes += [np.asarray(_jacobians(plants, jnp.full(mass.shape[-1], v))) for v in speeds]
     return [structures[int(np.argmax(np.max(np.abs(np.linalg.eigvals(slope)), axis=-1)))] for slope in slopes]
 
 

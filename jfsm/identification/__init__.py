@@ -9,9 +9,9 @@ from ._maximise import finish as finish
 from ._maximise import maximise as maximise
 from ._nuisances import Nuisances as Nuisances
 from ._nuisances import prepare as prepare
-from ._posterior import LANES as LANES
 from ._posterior import Hypothesis as Hypothesis
 from ._posterior import Posterior as Posterior
+from ._posterior import lanes_of as lanes_of
 from ._posterior import prior as prior
 from ._starts import missing_force as missing_force
 from ._starts import place as place

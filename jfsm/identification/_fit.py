@@ -1,7 +1,7 @@
 """Values of a structure's own numbers from records."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ _SURE = 0.05
 _STEPS = 60
 _PURSUED = 2
 """Beginnings that are followed to the top."""
+_REFINEMENTS = 3
 _LOOSE = 0.5
 """Relative standard error from which a value is hardly determined."""
 
@@ -99,7 +100,9 @@ def fit(
     free = free_paths(model, prepared, fixed)
     held = {path: value for path, value in model.values().items() if path not in free}
     beginnings = [model, *(start.with_values(held) for start in starts(model, prepared[0]))]
+    prepared = [n.resolving(beginnings) for n in prepared]
     posterior, best, lane = _best([_beginning(m, free, prepared, bounds or {}) for m in beginnings], prepared)
+    posterior, best, lane = _resolved(posterior, best, lane)
     unknowns, structure = posterior.hypothesis.unknowns[lane], posterior.hypothesis.structures[lane]
     theta = best.theta[lane]
     covariance = sandwich(best.information[lane], posterior.scatter(best.theta)[lane])
@@ -156,6 +159,18 @@ def _best(beginnings: Sequence[tuple], prepared: Sequence[Nuisances]) -> tuple[P
     tops = [(posteriors[k], finish(posteriors[k], rungs[k], _STEPS)) for k in order]
     posterior, best = min(tops, key=lambda top: float(np.min(top[1].value)))
     return posterior, best, int(np.argmin(best.value))
+
+
+def _resolved(posterior: Posterior, best: Maximum, lane: int) -> tuple[Posterior, Maximum, int]:
+    """The same top climbed again, while what was found moves too fast for the steps that it was found with."""
+    for _ in range(_REFINEMENTS):
+        records = [n.resolving([posterior.structure(best.theta[lane], lane)]) for n in posterior.records]
+        if all(new is old for new, old in zip(records, posterior.records, strict=True)):
+            break
+        hypothesis = Hypothesis((posterior.hypothesis.structures[lane],), (posterior.hypothesis.unknowns[lane],))
+        posterior = Posterior(hypothesis, records)
+        best, lane = finish(posterior, replace(best, theta=best.theta[lane : lane + 1]), _STEPS), 0
+    return posterior, best, lane
 
 
 def free_paths(model: Structure, records: Sequence[Nuisances], fixed: Sequence[str]) -> tuple[str, ...]:
@@ -240,7 +255,7 @@ def _words(
 def _combination(first: tuple[Unknown, float, float], second: tuple[Unknown, float, float], r: float) -> str:
     """What two numbers that are tied by a correlation `r` determine together."""
     (u, t, s), (other, t2, s2) = first, second
-    if u.log and other.log:
+    if u.log and other.log and 0.8 < s / s2 < 1.25:
         return "their ratio" if r > 0 else "their product"
     # The combination u + w·other that varies least.
     weight = -r * (u.slope(t) * s) / (other.slope(t2) * s2)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,8 @@ _ENOUGH = 0.01
 """A step that promises less than this many nats is the last,"""
 _HOPELESS = 0.02
 """or less than this share of what the start is behind the best value known."""
+_WALL = 1e-3
+"""Damping of a step that is to come down from the wall of a valley, not to go along it."""
 _LONGEST = 1.0
 """Largest change of a logarithm in one step."""
 
@@ -66,6 +69,20 @@ def maximise(posterior: Posterior) -> Maximum:
     return finish(posterior, approach(posterior))
 
 
+class _Place(NamedTuple):
+    """Where the lanes stand: theta, minus log-posterior, its gradient and the information."""
+
+    theta: np.ndarray
+    value: np.ndarray
+    gradient: np.ndarray
+    information: np.ndarray
+
+    def where(self, chosen: np.ndarray, other: "_Place") -> "_Place":
+        """This place for the chosen lanes, the other for the rest."""
+        pairs = zip(self, other, strict=True)
+        return _Place(*(np.where(chosen.reshape((-1,) + (1,) * (a.ndim - 1)), a, b) for a, b in pairs))
+
+
 def _climb(
     posterior: Posterior,
     theta: np.ndarray,
@@ -75,19 +92,27 @@ def _climb(
     best: float = np.inf,
     most: int | None = None,
 ) -> Maximum:
+    """The top from `theta` by damped steps.
+
+    In a narrow valley that bends, a long step along it ends on the wall. So a step that leads up is not taken back at
+    once: a second one, from where it led and straight down, may end below where both began.
+    """
     unknowns = posterior.hypothesis.unknowns
     low = np.array([[u.low for u in row] for row in unknowns])
     high = np.array([[u.high for u in row] for row in unknowns])
     log = np.array([[u.log or u.path.startswith("noise@") for u in row] for row in unknowns])
     lanes = theta.shape[0]
-    value, gradient, information = _finite(posterior.evaluate(theta, slack, most))
+    here = _Place(theta, *_finite(posterior.evaluate(theta, slack, most)))
+    beyond, astray = here, np.zeros(lanes, bool)
     damp = np.full(lanes, 1e-3)
     open_, results = np.ones(lanes, bool), [Result.maximum_steps] * lanes
     for _ in range(steps):
-        move, promise = _steps(theta, gradient, information, damp, low, high, log)
-        for lane in np.flatnonzero(open_):
-            target = min(best, float(np.min(value)))
-            behind = value[lane] - target if np.isfinite(target) and np.isfinite(value[lane]) else 0.0
+        start = beyond.where(astray, here)
+        damping = np.where(astray, np.maximum(damp, _WALL), damp)
+        move, promise = _steps(start, damping, low, high, log)
+        for lane in np.flatnonzero(open_ & ~astray):
+            target = min(best, float(np.min(here.value)))
+            behind = here.value[lane] - target if np.isfinite(target) and np.isfinite(here.value[lane]) else 0.0
             # A negative promise is no sign of a top, but of a step that its bounds bent: a shorter one will do.
             if 0 <= promise[lane] < enough + _HOPELESS * max(behind, 0.0) and damp[lane] < 1.0:
                 open_[lane], results[lane] = False, Result.successful
@@ -95,19 +120,19 @@ def _climb(
                 open_[lane], results[lane] = False, Result.stalled
         if not np.any(open_):
             break
-        trial = np.where(open_[:, None], theta + move, theta)
-        tried, slope, curve = _finite(posterior.evaluate(trial, slack, most))
-        better = open_ & (tried < value)
-        theta = np.where(better[:, None], trial, theta)
-        value = np.where(better, tried, value)
-        gradient = np.where(better[:, None], slope, gradient)
-        information = np.where(better[:, None, None], curve, information)
-        damp = np.where(better, np.maximum(damp / 10, 1e-9), np.where(open_, np.maximum(damp, 1e-4) * 10, damp))
-    return Maximum(value, theta, information, tuple(results))
+        trial = np.where(open_[:, None], start.theta + move, here.theta)
+        there = _Place(trial, *_finite(posterior.evaluate(trial, slack, most)))
+        better = open_ & (there.value < here.value)
+        failed = open_ & ~better & (astray | (damp >= _WALL) | ~np.isfinite(there.value))
+        astray = open_ & ~better & ~failed
+        here, beyond = there.where(better, here), there
+        damp = np.where(better, np.maximum(damp / 10, 1e-9), np.where(failed, np.maximum(damp, 1e-4) * 10, damp))
+    return Maximum(here.value, here.theta, here.information, tuple(results))
 
 
-def _steps(theta, gradient, information, damp, low, high, log):
+def _steps(place: "_Place", damp, low, high, log):
     """Damped Newton steps within bounds, and the gain that each promises."""
+    theta, _, gradient, information = place
     moves, promises = np.zeros_like(theta), np.zeros(theta.shape[0])
     for lane in range(theta.shape[0]):
         g, f = gradient[lane], information[lane]

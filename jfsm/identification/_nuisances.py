@@ -1,6 +1,7 @@
 """What every hypothesis on a record shares: its noise, its reconstructed drive, its unknown start and offsets."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
 import numpy as np
@@ -87,6 +88,18 @@ class Nuisances:
         readings = Readings(r.values[:n], r.use[:n], r.variance, r.valid[:n])
         return Fine(f.force[:n], f.base[:n], f.time[:n], f.step), readings
 
+    def resolving(self, structures: Sequence[Structure]) -> "Nuisances":
+        """The same record with steps short enough for all of these structures."""
+        record, fine = self.record, self.fine
+        speed = typical_speed(record)
+        need = max(substeps_for(structure, record.dt, speed) for structure in structures)
+        if need <= fine.substeps:
+            return self
+        samples = np.asarray(fine.force)[: self.samples, 0]
+        length = fine.time.shape[0]
+        finer = excitation(record, samples.shape[1], need, self.reconstruction, length=length, force=samples)
+        return replace(self, fine=finer)
+
 
 def prepare(
     record: Record,
@@ -156,6 +169,9 @@ def prepare(
         + np.eye(dof) * (_LEAST_DISTURBANCE * size) ** 2 / omega * dt
     )
     x0, v0 = starting_state(model, record, reconstruction=reconstruction)
+    for i, (kind, j) in enumerate(channels):  # what is measured tells more than a model that lacks something
+        if kind != "acceleration" and not record.at_rest:
+            (x0 if kind == "displacement" else v0)[j - 1] = values[0, i]
     return Nuisances(
         record=record,
         channels=channels,

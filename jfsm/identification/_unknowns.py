@@ -21,6 +21,8 @@ TYPICAL, TYPICAL_SPREAD = 0.15, 1.5
 """An effect's size as a share of the elastic force, and the spread of its logarithm."""
 _SHAPE_SPREAD = 1.0
 _OFFSET = 0.1
+_START_SPREAD = 3.0
+"""Doubt about the initial state, in sizes of the motion: a model that lacks something may guess it badly."""
 _SCALE_SPREAD, _SCALE_SPREAD_GUESSED = 0.5, 3.0
 
 
@@ -142,7 +144,8 @@ def nuisance_unknowns(structure: Structure, nuisances: Nuisances, index: int) ->
             ("v0", nuisances.v0, nuisances.length * nuisances.omega),
         ):
             for j, value in enumerate(guess):
-                found.append(Unknown(f"{name}@{j + 1}", value / unit, unit, False, value / unit, 1.0, record=index))
+                theta, path = value / unit, f"{name}@{j + 1}"
+                found.append(Unknown(path, theta, unit, False, theta, _START_SPREAD, record=index))
     for c in range(len(nuisances.channels)):
         width, reach = (_SCALE_SPREAD, 2.0) if nuisances.trusted[c] else (_SCALE_SPREAD_GUESSED, 8.0)
         found.append(Unknown(f"noise@{c}", 0.0, 1.0, False, 0.0, width, record=index, low=-reach, high=reach))
