@@ -4,8 +4,8 @@
 
 For every cause, records are drawn from plants with that law (SciPy, 1 % noise on every channel). The fit begins at the
 owner's model with the law at one of its natural shapes, drawn at random and of a third of the elastic force. It counts
-as converged when it ends no lower than a fit that begins with the law's true numbers does. One line of JSON per record is appended as it is
-done; the same call goes on where it was stopped.
+as converged when it ends no lower than a fit that begins with the law's true numbers does. One line of JSON per record
+is appended as it is done; the same call goes on where it was stopped.
 """
 
 import argparse
@@ -29,7 +29,7 @@ from tests.blind import Challenge, draw  # noqa: E402
 
 NOT_FITTED = ("none", "stiffness_value", "damping_value", "mass_value", "clipping")
 BEHIND = 1.0
-"""Nats that a converged fit may end below the one from the truth."""
+"""Nats that a converged fit may end below the one from the true numbers."""
 
 Row = dict[str, Any]
 
