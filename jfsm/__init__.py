@@ -17,6 +17,8 @@ from .dynamics import limit_cycles as limit_cycles
 from .dynamics import linearise as linearise
 from .dynamics import simulate as simulate
 from .dynamics import simulate_many as simulate_many
+from .estimation import Motion as Motion
+from .estimation import estimate_motion as estimate_motion
 from .identification import Fit as Fit
 from .identification import fit as fit
 from .records import Record as Record

@@ -7,3 +7,5 @@ from ._filter import Start as Start
 from ._filter import innovations as innovations
 from ._latent import Latent as Latent
 from ._latent import latent_force as latent_force
+from ._motion import Motion as Motion
+from ._motion import estimate_motion as estimate_motion

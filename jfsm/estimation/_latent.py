@@ -9,8 +9,8 @@ not for the likelihood of a hypothesis.
 
 from dataclasses import dataclass
 from itertools import product
+from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -20,6 +20,7 @@ from jaxtyping import Array, Float
 from ..dynamics._along import force_along
 from ..dynamics._grid import Fine
 from ..dynamics._plant import Plant, Readout
+from ._kalman import LinearModel, log_likelihood, smoothed
 
 _MEMORIES = (0.15, 1.0)
 """τ of the latent force, in radians of the motion."""
@@ -46,13 +47,12 @@ class Latent:
     std: np.ndarray
 
 
-class _Model(eqx.Module):
-    step: Float[Array, "state state"]
+class _Model(NamedTuple):
+    """The motion, and how the force enters it: over a step, and straight into an acceleration."""
+
+    linear: LinearModel
     by_force: Float[Array, "halves state dof"]
-    noise: Float[Array, "state state"]
-    rows: Float[Array, "channels state"]
     through: Float[Array, "channels dof"]
-    start: Float[Array, "state state"]
 
 
 def latent_force(
@@ -88,13 +88,14 @@ def latent_force(
             tau / omega,
             share * omega**2 * length,
             np.asarray(force_variance),
+            np.asarray(variance),
             omega,
             length,
         )
         for tau, share in product(_MEMORIES, _AMPLITUDES)
     ]
     stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *models)
-    data = (jnp.asarray(true), jnp.asarray(seen), jnp.asarray(use), jnp.asarray(variance))
+    data = (jnp.asarray(true), jnp.asarray(seen), jnp.asarray(use))
     likelihoods = np.asarray(_likelihoods(stacked, *data))
     best = models[int(np.nanargmax(likelihoods))]
     mean, std = (np.asarray(out) for out in _smooth(best, *data))
@@ -104,7 +105,9 @@ def latent_force(
     return Latent(x, v, r - known, std[:, 2 * dof :])
 
 
-def _model(plant: Plant, show: Readout, dt, substeps, tau, amplitude, force_variance, omega, length) -> _Model:
+def _model(
+    plant: Plant, show: Readout, dt, substeps, tau, amplitude, force_variance, variance, omega, length
+) -> _Model:
     dof = plant.dof
     minv = np.linalg.inv(np.asarray(plant.mass))
     zero, eye = np.zeros((dof, dof)), np.eye(dof)
@@ -135,51 +138,22 @@ def _model(plant: Plant, show: Readout, dt, substeps, tau, amplitude, force_vari
     )
     sizes = np.concatenate([np.full(dof, length), np.full(dof, length * omega), amplitude * mass])
     start = np.diag((_WIDE * sizes) ** 2)
-    return _Model(*(jnp.asarray(a) for a in (step, carried, noise, rows, through, start)))
+    linear = LinearModel(*(jnp.asarray(a) for a in (step, noise, rows, variance, start)))
+    return _Model(linear, jnp.asarray(carried), jnp.asarray(through))
 
 
-def _filter(model: _Model, force, values, use, variance):
-    """Filtered and predicted moments at every sample, and the log-likelihood."""
-
-    def body(carry, inputs):
-        mean, covariance = carry
-        g, y, counted = inputs
-        predicted = (mean, covariance)
-        total = jnp.zeros(())
-        for c in range(y.shape[0]):
-            row = model.rows[c]
-            cross = jnp.sum(covariance * row[None, :], 1)
-            spread = jnp.sum(row * cross) + variance[c]
-            error = y[c] - jnp.sum(row * mean) - jnp.sum(model.through[c] * g[0])
-            weight = counted[c] * cross / spread
-            mean, covariance = mean + weight * error, covariance - weight[:, None] * cross[None, :]
-            total = total - 0.5 * counted[c] * (error**2 / spread + jnp.log(spread))
-        moved = model.step @ mean + jnp.einsum("hsd,hd->s", model.by_force, g)
-        return (moved, model.step @ covariance @ model.step.T + model.noise), (*predicted, mean, covariance, total)
-
-    start = (jnp.zeros(model.start.shape[0]), model.start)
-    return jax.lax.scan(body, start, (force, values, use))[1]
+def _driven(model: _Model, force, values):
+    """What the force adds over every step, and the readings less what it adds to them at once."""
+    return jnp.einsum("hsd,nhd->ns", model.by_force, force), values - force[:, 0] @ model.through.T
 
 
 @jax.jit
-def _likelihoods(models: _Model, force, values, use, variance):
-    return jax.vmap(lambda m: jnp.sum(_filter(m, force, values, use, variance)[-1]))(models)
+def _likelihoods(models: _Model, force, values, use):
+    return jax.vmap(lambda m: log_likelihood(m.linear, *_driven(m, force, values), use))(models)
 
 
 @jax.jit
-def _smooth(model: _Model, force, values, use, variance):
-    ahead, spread_ahead, mean, covariance, _ = _filter(model, force, values, use, variance)
-
-    def body(carry, inputs):
-        later, spread_later = carry
-        ahead, spread_ahead, mean, covariance = inputs
-        weight = jnp.linalg.solve(spread_ahead, model.step @ covariance).T
-        mean = mean + weight @ (later - ahead)
-        covariance = covariance + weight @ (spread_later - spread_ahead) @ weight.T
-        return (mean, covariance), (mean, jnp.diag(covariance))
-
-    inputs = (ahead[1:], spread_ahead[1:], mean[:-1], covariance[:-1])
-    _, (means, variances) = jax.lax.scan(body, (mean[-1], covariance[-1]), inputs, reverse=True)
-    means = jnp.concatenate([means, mean[-1:]])
-    variances = jnp.concatenate([variances, jnp.diag(covariance[-1])[None]])
-    return means, jnp.sqrt(jnp.maximum(variances, 0.0))
+def _smooth(model: _Model, force, values, use):
+    size = model.linear.step.shape[0]
+    mean, covariance = smoothed(model.linear, *_driven(model, force, values), use, jnp.eye(size))
+    return mean, jnp.sqrt(jnp.maximum(jnp.diagonal(covariance, axis1=1, axis2=2), 0.0))
