@@ -1,12 +1,17 @@
 """Records from files, and back."""
 
 import json
+import subprocess
+import sys
+import tracemalloc
 
+import h5py
 import numpy as np
 import pytest
 import scipy.io
 
 from jfsm.records import Record, read
+from jfsm.records.formats import text
 
 T = np.arange(100) * 0.02
 U = np.cos(3.0 * T)
@@ -18,13 +23,17 @@ def _save(path, **arrays):
         np.savez(path, **arrays)
     elif path.suffix == ".mat":
         scipy.io.savemat(path, arrays)
+    elif path.suffix == ".h5":
+        with h5py.File(path, "w") as file:
+            for name, array in arrays.items():
+                file[name] = array
     else:
         columns = np.column_stack(list(arrays.values()))
         np.savetxt(path, columns, delimiter=",", header=",".join(arrays), comments="", fmt="%.17g")
     return path
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".npz", ".mat"])
+@pytest.mark.parametrize("suffix", [".csv", ".npz", ".mat", ".h5"])
 def test_channels_are_named_and_their_units_converted(tmp_path, suffix):
     path = _save(tmp_path / f"run{suffix}", time=T, u=U, y=1e3 * Y)
     record = read(path, force="u", displacement="y", units={"u": "N", "y": "mm"}, at_rest=True)
@@ -34,7 +43,7 @@ def test_channels_are_named_and_their_units_converted(tmp_path, suffix):
     assert (record.name, record.at_rest, record.drive, record.units["displacement"]) == ("run", True, "force", "m")
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".txt", ".npz", ".mat"])
+@pytest.mark.parametrize("suffix", [".csv", ".txt", ".npz", ".mat", ".h5", ".hdf5", ".uff", ".unv"])
 @pytest.mark.parametrize("units", [{}, {"force": "kip", "displacement": "deg"}, {"displacement": "mV", "force": "V"}])
 def test_a_written_record_is_read_back_the_same(tmp_path, suffix, units):
     channels = {"force": {2: U}, "displacement": np.stack([Y, U], 1), "acceleration": Y / 3, "base_acceleration": U / 7}
@@ -50,7 +59,7 @@ def test_a_written_record_is_read_back_the_same(tmp_path, suffix, units):
     assert (again.at_rest, again.drive, again.name, again.notes) == (True, "motion", "Lauf 7, März", ("cut",))
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".npz", ".mat"])
+@pytest.mark.parametrize("suffix", [".csv", ".npz", ".mat", ".h5", ".uff"])
 def test_a_record_without_channels_is_read_back(tmp_path, suffix):
     Record(T).write(tmp_path / f"a{suffix}")
     again = read(tmp_path / f"a{suffix}")
@@ -93,7 +102,7 @@ def test_a_missing_file_is_reported_as_such(tmp_path):
 
 @pytest.mark.parametrize("clock", [{"fs": 50.0}, {"sample_rate": 50.0}, {"dt": 0.02}])
 def test_a_single_number_gives_the_clock(tmp_path, clock):
-    for suffix in (".npz", ".mat"):
+    for suffix in (".npz", ".mat", ".h5"):
         record = read(_save(tmp_path / f"a{suffix}", u=U, **clock), force="u")
         np.testing.assert_allclose(record.time, T, atol=1e-12)
 
@@ -122,13 +131,6 @@ def test_fields_of_a_matlab_struct_have_dotted_names(tmp_path):
     scipy.io.savemat(tmp_path / "a.mat", {"run": {"time": T, "acc": {"tip": Y}, "comment": "shaker"}})
     record = read(tmp_path / "a.mat", time="run.time", acceleration="run.acc.tip")
     np.testing.assert_array_equal(record.channels["acceleration", 1], Y)
-
-
-def test_a_matlab_file_of_version_seven_three_names_the_remedy(tmp_path):
-    head = b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(512)
-    (tmp_path / "a.mat").write_bytes(head)
-    with pytest.raises(ValueError, match=r"a\.mat must be a MATLAB file of version 7 or earlier.*save\(.*-v7"):
-        read(tmp_path / "a.mat", force="u")
 
 
 def test_pickled_objects_in_an_archive_are_left_alone(tmp_path):
@@ -160,9 +162,13 @@ def _text(delimiter, head="", decimal=".", end=""):
         (_text(",", "time,u,\n", end=","), "u"),
         (_text(",", "\ufefftime,u\n"), "u"),
         (_text(",", 'time,"u, front"\n'), "u, front"),
+        (_text("\t", "time\tu\n", decimal=","), "u"),
+        (_text("  ", "# time u\n# [s] [N]\n", decimal=","), "u"),
+        (_text(",", "time,u\r\n").replace("\n", "\r\n").replace("\r\r", "\r"), "u"),
+        (_text(";", "sep=;\ntime;u\ns;N\n", decimal=","), "u"),
     ],
     ids=["comma", "comma and blank", "tab", "semicolon", "percent", "hash", "preamble", "units", "[units]", "trailing",
-         "byte order mark", "quoted"],
+         "byte order mark", "quoted", "tab and decimal comma", "units in a comment", "carriage returns", "sep="],
 )  # fmt: skip
 def test_layouts_of_text_are_found(tmp_path, text, name):
     (tmp_path / "a.csv").write_text(text, encoding="utf-8")
@@ -191,15 +197,44 @@ def test_a_column_of_text_or_of_gaps_is_refused_only_when_it_is_used(tmp_path):
     lines = [f"{t},{u},{'ok' if i else 'bad'},{'' if i == 7 else u}" for i, (t, u) in enumerate(ROWS)]
     (tmp_path / "a.csv").write_text("time,u,state,w\n" + "\n".join(lines))
     assert len(read(tmp_path / "a.csv", force="u")) == 100
-    with pytest.raises(TypeError, match="`force` must hold real numbers"):
+    with pytest.raises(ValueError, match=r"a\.csv must hold numbers in column 'state'; line 2 holds 'bad'\. Repair"):
         read(tmp_path / "a.csv", force="state")
     with pytest.raises(ValueError, match=r"`force dof 1` must be finite; 1 of 100.*is sample 7"):
         read(tmp_path / "a.csv", force="w")
 
 
-def test_older_encodings_are_read(tmp_path):
-    (tmp_path / "a.csv").write_bytes(_text(",", "time,Kraft für 3°\n").encode("latin-1"))
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-16"])
+def test_other_encodings_are_read(tmp_path, encoding):
+    (tmp_path / "a.csv").write_bytes(_text(",", "time,Kraft für 3°\n").encode(encoding))
     assert len(read(tmp_path / "a.csv", force="Kraft für 3°")) == 100
+
+
+def test_rows_that_begin_with_a_gap_belong_to_the_data(tmp_path):
+    lines = [f"{t},{u},{'late' if i > 20 else ''}" for i, (t, u) in enumerate(ROWS)]
+    (tmp_path / "a.csv").write_text("time,u,state\n" + "\n".join(lines))
+    assert len(read(tmp_path / "a.csv", force="u")) == 100
+
+
+def test_text_is_read_in_blocks(tmp_path, monkeypatch):
+    monkeypatch.setattr(text, "BLOCK", 7)
+    (tmp_path / "a.csv").write_text(_text(",", "time,u\n"))
+    samples = read(tmp_path / "a.csv", force="u").channels["force", 1]
+    np.testing.assert_allclose(samples, U, atol=5.1e-5)
+    Record(T, force=U).write(tmp_path / "b.csv")
+    np.testing.assert_array_equal(read(tmp_path / "b.csv").channels["force", 1], U)
+
+
+def test_a_long_text_takes_a_few_times_the_memory_of_its_numbers(tmp_path):
+    n = 200_000
+    with (tmp_path / "a.csv").open("w") as stream:
+        stream.write("time,u\n")
+        stream.writelines(f"{0.001 * i:.3f},{i % 97}\n" for i in range(n))
+    tracemalloc.start()
+    record = read(tmp_path / "a.csv", force="u")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(record) == n
+    assert peak < 5 * (2 * 8 * n)  # columns, their copies in the record and one block of text; all text would take 20
 
 
 def test_columns_of_one_name_stay_apart(tmp_path):
@@ -213,6 +248,8 @@ def test_columns_of_one_name_stay_apart(tmp_path):
         ("time,u\n0,1\n1,2\n2,3\n3\n", r"a\.csv must have 2 columns in every row of data; line 5 has 1"),
         ("nothing\nto see\nhere\n", r"a\.csv must hold columns of numbers; its middle line is 'to see'"),
         ("", r"a\.csv must hold columns of numbers; its middle line is ''"),
+        ("PK\x03\x04\x00\x01", r"a\.csv must hold columns of numbers; its middle line is 'PK.*Export numbers"),
+        ("time,u\n0,1\n1,2\n2,#N/A\n3,3\n", r"a\.csv must hold numbers in column 'u'; line 4 holds '#N/A'\. Repair"),
     ],
 )
 def test_text_that_is_no_table_is_refused(tmp_path, text, message):
@@ -228,10 +265,22 @@ def test_text_that_is_no_table_is_refused(tmp_path, text, message):
         (dict(force="force_on"), r"`force` must name a channel .*; it was 'force_on'\. Did you mean 'force_in'\?"),
         (dict(force="m[2]"), r"`force` must name a column that exists; 'm' in a\.npz has shape \(100, 2\)"),
         (dict(force="force_in", units={"x": "m"}), "`units` must name channels that are read, .*; it names 'x'"),
+        (dict(force="force_in", sensitivity={"t": "1 V/N"}), "`sensitivity` must name channels that are read, .* 't'"),
+        (
+            dict(force="force_in", sensitivity={"force": "100 mV"}),
+            "`sensitivity` of force_in must be a number of raw.*mV'",
+        ),
+        (dict(force="force_in", sensitivity={"force": "9 mV/mm"}), "`sensitivity` of force_in must be .* of force, as"),
+        (dict(force="force_in", sensitivity={"force": "9 mV/V"}), "`sensitivity` of force_in must be .*'9 mV/V'"),
+        (dict(force="force_in", sensitivity={"force": "0 mV/N"}), "`sensitivity` of force_in must be .*'0 mV/N'"),
+        (
+            dict(force="force_in", units={"force": "N"}, sensitivity={"force": "9 mV/N"}),
+            "`sensitivity` of force_in must be given for numbers in V; they are in N",
+        ),
         (dict(force="force_in", units={"force_in": "ell"}), "`units` of force must be a unit of force.*'ell'"),
         (
             dict(displacement=["m[0]", "m[1]"], units={"m[0]": "mm"}),
-            r"`units` must be the same for all channels of a kind; those of displacement are .*'m\[1\]': None",
+            r"`units` must be the same for all channels of a kind; those of displ.* are .*'m\[1\]': None\} in a\.npz",
         ),
         (dict(force="force_in", time="t", rate=3.0), r"`time` and `rate` cannot both be given; they were 't' and 3\.0"),
         (dict(force="force_in", rate=-1.0), r"`rate` must be a positive number of samples per second; it was -1\.0"),
@@ -255,3 +304,67 @@ def test_the_remarks_of_a_written_text_file_are_one_line_of_json(tmp_path):
     remarks = json.loads(lines[0].removeprefix("# jfsm record "))
     assert remarks == {"at_rest": False, "drive": "force", "name": None, "notes": []}
     assert lines[1:3] == ["time,force_1", "[s],[N]"]
+
+
+def test_a_unit_that_is_not_known_names_the_file_and_the_remedy(tmp_path):
+    (tmp_path / "a.csv").write_text(_text(",", "time,u [EU]\n"))
+    with pytest.raises(
+        ValueError, match=r"a\.csv must state a unit of force for 'u'; it states 'EU'\. .*units=\{'u': "
+    ):
+        read(tmp_path / "a.csv", force="u")
+    assert len(read(tmp_path / "a.csv", force="u", units={"u": "N"})) == 100
+
+
+@pytest.mark.parametrize(
+    ("head", "units", "text", "factor"),
+    [
+        ("time,a1\n", {}, "100 mV/g", 9.80665 / 100),  # readings in the unit of the sensitivity
+        ("time,a1\ns,V\n", {}, "100 mV/g", 9.80665 / 0.1),  # in that of the file
+        ("time,a1\ns,V\n", {"a1": "mV"}, "10.2 mV/(m/s²)", 1 / 10.2),  # in that of the caller
+        ("time,a1\n", {}, "-1e-1 V/m/s^2", -10.0),
+    ],
+)
+def test_a_sensitivity_makes_readings_what_the_sensor_measures(tmp_path, head, units, text, factor):
+    (tmp_path / "a.csv").write_text(_text(",", head))
+    for name in ("a1", "acceleration"):
+        record = read(tmp_path / "a.csv", acceleration="a1", units=units, sensitivity={name: text})
+        np.testing.assert_allclose(
+            record.channels["acceleration", 1], factor * U, rtol=1e-12, atol=abs(factor) * 5.1e-5
+        )
+        assert record.units["acceleration"] == "m/s²"
+
+
+def test_sensors_of_different_sensitivity_make_one_kind(tmp_path):
+    path = _save(tmp_path / "a.npz", time=T, a1=100 * U, a2=51 * Y)
+    record = read(path, acceleration=["a1", "a2"], sensitivity={"a1": "100 mV/g", "a2": "51 mV/g"})
+    np.testing.assert_allclose(np.asarray(record.acceleration), 9.80665 * np.stack([U, Y], 1), rtol=1e-14)
+
+
+def test_instants_beside_the_channels_come_before_those_at_the_top(tmp_path):
+    scipy.io.savemat(tmp_path / "a.mat", {"time": 2 * T, "run": {"time": T, "u": U}, "v": U})
+    assert read(tmp_path / "a.mat", force="run.u").dt == pytest.approx(0.02)
+    assert read(tmp_path / "a.mat", force="v").dt == pytest.approx(0.04)
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".mat", ".h5", ".uff"])
+@pytest.mark.parametrize("content", [b"", b"time,u\n0,1\n1,2\n", "cut"])
+def test_a_file_that_is_none_of_its_kind_is_refused_and_left_as_it_was(tmp_path, suffix, content):
+    path = tmp_path / f"a{suffix}"
+    Record(T, force=U).write(path)
+    broken = path.read_bytes()[: path.stat().st_size // 2] if content == "cut" else content
+    path.write_bytes(broken)
+    with pytest.raises(ValueError, match=rf"a\{suffix} must be .*(Write or copy it again|Export)"):
+        read(path, force="force_1")
+    assert path.read_bytes() == broken
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".mat", ".h5", ".uff"])
+def test_a_missing_file_of_any_kind_is_reported_as_such(tmp_path, suffix):
+    with pytest.raises(FileNotFoundError):
+        read(tmp_path / f"a{suffix}", force="u")
+
+
+def test_reading_a_record_alone_loads_no_library_of_a_format():
+    program = "import sys, jfsm; assert not {'h5py', 'pyuff', 'nptdms', 'asammdf'} & set(sys.modules)"
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr

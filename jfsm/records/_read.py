@@ -1,25 +1,23 @@
 """A record from a file: which of its arrays is what."""
 
-import difflib
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from jfsm.records._record import Drive, Record
-from jfsm.records._units import KINDS
+from jfsm.records._units import find_sensitivity, find_unit
 from jfsm.records.formats import Contents, format_of
-
-ChannelName = str | Sequence[str] | Mapping[int, str] | None
-
-TIME_NAMES = ("time", "t")
-RATE_NAMES = ("fs", "sample_rate")  # Hz
-STEP_NAMES = ("dt",)  # s
-_OWN_NAME = re.compile(rf"^({'|'.join(KINDS)})(?:_(\d+))?$")
-_COLUMN = re.compile(r"^(?P<name>.+)\[(?P<column>\d+)\]$")
+from jfsm.records.formats.base import point_name
+from jfsm.records.formats.clocks import clock_of
+from jfsm.records.formats.lookup import (
+    ChannelName,
+    Choice,
+    choose,
+    dofs_of_points,
+    listed,
+    own_names,
+    samples_of,
+)
 
 
 def read(
@@ -32,6 +30,7 @@ def read(
     acceleration: ChannelName = None,
     base_acceleration: str | None = None,
     units: Mapping[str, str] | None = None,
+    sensitivity: Mapping[str, str] | None = None,
     rate: float | None = None,
     at_rest: bool | None = None,
     drive: Drive | None = None,
@@ -42,19 +41,24 @@ def read(
     Parameters
     ----------
     path : str or Path
-        A file of text (csv, txt, dat, tsv), NumPy (npz) or MATLAB (mat).
+        A file of text (csv, txt, dat, tsv), NumPy (npz), MATLAB (mat), HDF5 (h5, hdf5), a universal file (uff, unv),
+        or with the extras ``jfsm[tdms]`` and ``jfsm[mf4]`` of National Instruments (tdms) and ASAM (mf4, mdf).
     time : str, optional
-        Name of the column of instants; otherwise ``time`` or ``t`` is looked for, then a single number ``fs`` [Hz] or
-        ``dt`` [s].
+        Name of the column of instants; otherwise the clock that the channels have in the file, then ``time`` or ``t``
+        is looked for, then a single number ``fs`` [Hz] or ``dt`` [s]: beside the channels first, then at the top.
     force, displacement, velocity, acceleration : str, sequence of str, or {dof: str}, optional
         Name of the channel: the head of a column (``column 3`` where it has none), a variable, a field
-        ``struct.field``. The columns of a matrix (n, dof) are taken together, or one by one as ``name[0]``,
+        ``struct.field``, a dataset ``group/name``, a node and direction ``3:+Z`` (with the opposite sign if the file
+        has it as ``3:-Z``). The columns of a matrix (n, dof) are taken together, or one by one as ``name[0]``,
         ``name[1]``. Without any name the columns called ``force``, ``displacement_2`` and the like are taken, as
-        `Record.write` calls them.
+        `Record.write` calls them, or all that a universal file says the kind of, their dofs numbered by node.
     base_acceleration : str, optional
         Name of the channel.
     units : mapping, optional
         Unit of each channel by the name it has in the file, or by its kind. What the file itself states is the default.
+    sensitivity : mapping, optional
+        Of a channel that the file has in raw units, by its name or kind: ``{"a1": "100 mV/g", "force": "2.25 mV/N"}``.
+        The numbers are in the raw unit of the sensitivity (mV) unless the file or `units` says another (V).
     rate : float, optional
         Samples per second [Hz] of a file without instants; the clock then begins at 0.
     at_rest, drive, name : optional
@@ -68,6 +72,8 @@ def read(
     ------
     FileNotFoundError
         If there is no such file.
+    ModuleNotFoundError
+        If its format needs an extra that is not installed.
     ValueError
         If the format is not known, a name is not in the file, no clock is found, or the numbers make no `Record`.
 
@@ -81,7 +87,9 @@ def read(
         record = Record(samples, force=force["u"].ravel(), displacement=motion["y"].ravel())
     """
     path = Path(path)
-    contents = format_of(path).load(path)
+    file_format = format_of(path)
+    with path.open("rb"):
+        pass  # a file that is missing or locked is reported as such, whatever a library would make of it
     wanted: dict[str, ChannelName] = {
         "force": force,
         "displacement": displacement,
@@ -89,140 +97,136 @@ def read(
         "acceleration": acceleration,
         "base_acceleration": base_acceleration,
     }
-    wanted = {kind: names for kind, names in wanted.items() if names is not None} or _own_names(contents, path)
+    return record_of(
+        file_format.load(path),
+        path.name,
+        wanted,
+        time=time,
+        units=units or {},
+        sensitivity=sensitivity or {},
+        rate=rate,
+        at_rest=at_rest,
+        drive=drive,
+        name=name,
+        default_name=path.stem,
+    )
+
+
+def record_of(
+    contents: Contents,
+    source: str,
+    wanted: Mapping[str, ChannelName],
+    *,
+    units: Mapping[str, str],
+    sensitivity: Mapping[str, str],
+    time: str | None = None,
+    rate: float | None = None,
+    at_rest: bool | None = None,
+    drive: Drive | None = None,
+    name: str | None = None,
+    default_name: str | None = None,
+) -> Record:
+    """The record in contents that messages call `source`; the other arguments and errors as those of `read`."""
+    named = {kind: names for kind, names in wanted.items() if names is not None}
+    chosen = {
+        kind: _by_dof(contents, source, kind, names) for kind, names in (named or own_names(contents, source)).items()
+    }
+    every = [choice for choices in chosen.values() for choice in choices.values()]
+    clock, column = clock_of(contents, source, every, time, rate)
+    used = every if column is None else [*every, column]
+    _require_read("units", units, used)
+    _require_read("sensitivity", sensitivity, every)
+    stated = {choice: _unit(contents, source, choice, units) for choice in used}
+    factors: dict[Choice, float] = {}
+    for choice in every:
+        given = _said(sensitivity, choice)
+        if given is not None:
+            sensor = find_sensitivity(given, choice.name, choice.kind)
+            written = find_unit(stated[choice] or sensor.reading, choice.kind)
+            factors[choice] = written.factor / (sensor.size * find_unit(sensor.reading, choice.kind).factor)
+            _require_raw(choice, stated[choice], written.coherent, find_unit(sensor.reading, choice.kind).coherent)
+            stated[choice] = sensor.unit
     channels: dict[str, Any] = {}
-    used: dict[str, list[str]] = {}
-    for kind, names in wanted.items():
-        channels[kind], used[kind] = _pick(contents, path, kind, names)
-    clock, clock_name = _clock(contents, path, time, rate, channels)
-    if clock_name is not None:
-        used["time"] = [clock_name]
+    for kind, choices in chosen.items():
+        arrays = {dof: samples_of(contents, source, choice) for dof, choice in choices.items()}
+        scaled = {dof: array * factors.get(choices[dof], 1.0) for dof, array in arrays.items()}
+        channels[kind] = scaled if None not in scaled else scaled[None]
     record = Record(
         clock,
         **channels,
-        units=_units_by_kind(contents, used, units or {}),
+        units=_one_for_each_kind(source, stated),
         at_rest=contents.about.get("at_rest", False) if at_rest is None else at_rest,
         drive=drive or contents.about.get("drive", "force"),
-        name=contents.about.get("name", path.stem) if name is None else name,
+        name=contents.about.get("name", default_name) if name is None else name,
     )
-    return record.noted(*contents.about.get("notes", ()))
+    notes = [*contents.about.get("notes", ()), *contents.notes]
+    if not named and contents.points and not contents.about:
+        numbered = (f"{dof} is {point_name(*point)}" for point, dof in dofs_of_points(contents).items())
+        notes.append(f"Degrees of freedom by node and direction: {', '.join(numbered)}.")
+    return record.noted(*notes)
 
 
-def _own_names(contents: Contents, path: Path) -> dict[str, ChannelName]:
-    """Channels that carry the names of kinds, as in a file that `Record.write` made."""
-    found: dict[str, Any] = {}
-    for name in contents.arrays:
-        match = _OWN_NAME.match(name)
-        if match and match[1] == "base_acceleration":
-            found[match[1]] = name
-        elif match and match[2] is None:
-            found[match[1]] = name  # the whole of a matrix, so not under a dof
-        elif match:
-            found.setdefault(match[1], {})[int(match[2])] = name
-    if not found and not contents.about:
-        raise ValueError(
-            f"{path.name} must be told which channel is what, as in read(path, force=..., displacement=...); "
-            f"it holds {_listed(contents.arrays)}."
-        )
-    return found
-
-
-def _pick(contents: Contents, path: Path, kind: str, names: ChannelName) -> tuple[Any, list[str]]:
-    """The argument of `Record` for one kind, and the names that went into it."""
+def _by_dof(contents: Contents, source: str, kind: str, names: ChannelName) -> dict[int | None, Choice]:
+    """What was asked for by dof, under None where one name stands for all of a kind."""
+    by_dof: Mapping[Any, str]
     if isinstance(names, str):
-        return _array(contents, path, kind, names), [names]
-    if isinstance(names, Mapping):
-        return {dof: _array(contents, path, kind, name) for dof, name in names.items()}, list(names.values())
-    chosen = list(names or ())
-    return {dof: _array(contents, path, kind, name) for dof, name in enumerate(chosen, start=1)}, chosen
-
-
-def _array(contents: Contents, path: Path, kind: str, name: str) -> NDArray[Any]:
-    """One channel, or a matrix of channels with the samples first."""
-    match = _COLUMN.match(name)
-    if name in contents.arrays or match is None:
-        base, column = name, None
+        by_dof = {None: names}
+    elif isinstance(names, Mapping):
+        by_dof = names
     else:
-        base, column = match["name"], int(match["column"])
-    if base not in contents.arrays:
-        close = difflib.get_close_matches(base, contents.arrays, n=1)
-        hint = f" Did you mean {close[0]!r}?" if close else ""
-        raise ValueError(
-            f"`{kind}` must name a channel of {path.name}, which holds {_listed(contents.arrays)}; "
-            f"it was {name!r}.{hint}"
-        )
-    array = np.asarray(contents.arrays[base])
-    if array.ndim == 2 and array.shape[0] < array.shape[1]:
-        array = array.T  # there are always more samples than channels
-    if array.ndim == 2 and array.shape[1] == 1:
-        array = array[:, 0]
-    if column is None:
-        return array
-    if array.ndim != 2 or column >= array.shape[1]:
-        raise ValueError(
-            f"`{kind}` must name a column that exists; {base!r} in {path.name} has shape {array.shape}, and {name!r} "
-            f"was asked for. Columns count from 0."
-        )
-    return array[:, column]
+        by_dof = dict(enumerate(names or (), start=1))
+    return {dof: choose(contents, source, kind, name) for dof, name in by_dof.items()}
 
 
-def _clock(
-    contents: Contents, path: Path, time: str | None, rate: float | None, channels: Mapping[str, Any]
-) -> tuple[NDArray[np.float64], str | None]:
-    """Instants, and the name of the column they come from (None when they are counted)."""
-    if time is not None and rate is not None:
-        raise ValueError(f"`time` and `rate` cannot both be given; they were {time!r} and {rate}. Leave one out.")
-    if rate is None:
-        names = [time] if time is not None else _found(contents, TIME_NAMES, single=False)
-        if names:
-            return _array(contents, path, "time", names[0]), names[0]
-        for name in _found(contents, RATE_NAMES, single=True):
-            rate = float(np.asarray(contents.arrays[name]).item())
-        for name in _found(contents, STEP_NAMES, single=True) if rate is None else ():
-            rate = 1.0 / float(np.asarray(contents.arrays[name]).item())
-    if rate is None:
-        raise ValueError(
-            f"{path.name} must say when its samples were taken; it holds {_listed(contents.arrays)}. "
-            f'Pass time="..." or rate=... [Hz].'
-        )
-    if not (np.isfinite(rate) and rate > 0):
-        raise ValueError(f"`rate` must be a positive number of samples per second; it was {rate}. Pass rate=... [Hz].")
-    first = next(iter(channels.values()), np.empty(0))
-    if isinstance(first, Mapping):
-        first = next(iter(first.values()), np.empty(0))
-    return np.arange(np.shape(first)[0]) / rate, None
+def _said(by_name: Mapping[str, str], choice: Choice) -> str | None:
+    """What a mapping says of a channel: by the caller's name, the file's, or the kind."""
+    return next((by_name[key] for key in (choice.name, choice.array, choice.kind) if key in by_name), None)
 
 
-def _found(contents: Contents, names: Iterable[str], single: bool) -> list[str]:
-    """Names of arrays called so, in any case of letters: single numbers, or columns."""
-    lower = {name.lower(): name for name in reversed(list(contents.arrays))}
-    present = [lower[name] for name in names if name in lower]
-    return [name for name in present if (np.size(contents.arrays[name]) == 1) == single]
-
-
-def _units_by_kind(contents: Contents, used: Mapping[str, Sequence[str]], units: Mapping[str, str]) -> dict[str, str]:
-    """One unit for each kind, from what the caller says and else from what the file states."""
-    names = [name for chosen in used.values() for name in chosen]
-    for key in units:
-        if key not in names and key not in used:
+def _require_read(argument: str, by_name: Mapping[str, str], used: Sequence[Choice]) -> None:
+    known = dict.fromkeys(key for choice in used for key in (choice.name, choice.array, choice.kind))
+    for key in by_name:
+        if key not in known:
             raise ValueError(
-                f"`units` must name channels that are read, one of {_listed([*names, *used])}; it names {key!r}. "
+                f"`{argument}` must name channels that are read, one of {listed(known)}; it names {key!r}. "
                 f"Use the name that the channel has in the file."
             )
+
+
+def _require_raw(choice: Choice, unit: str | None, written: str, reading: str) -> None:
+    if written != reading:
+        raise ValueError(
+            f"`sensitivity` of {choice.name} must be given for numbers in {reading}; they are in {unit}. Leave the "
+            f"sensitivity out, or correct the unit by units={{{choice.name!r}: {reading!r}}}."
+        )
+
+
+def _unit(contents: Contents, source: str, choice: Choice, units: Mapping[str, str]) -> str | None:
+    """Unit of a channel, from what the caller says and else from what the file states."""
+    given = _said(units, choice)
+    stated = contents.units.get(choice.array)
+    if given is not None or stated is None:
+        return given
+    try:
+        find_unit(stated, choice.kind)
+    except ValueError as error:
+        raise ValueError(
+            f"{source} must state a unit of {choice.kind} for {choice.name!r}; it states {stated!r}. Say which is "
+            f"meant by units={{{choice.name!r}: ...}}, or read the channel as what it is."
+        ) from error
+    return stated
+
+
+def _one_for_each_kind(source: str, stated: Mapping[Choice, str | None]) -> dict[str, str]:
     result: dict[str, str] = {}
-    for kind, chosen in used.items():
-        stated = {name: units.get(name, units.get(kind, contents.units.get(name))) for name in chosen}
-        if len(set(stated.values())) > 1:
+    for kind in dict.fromkeys(choice.kind for choice in stated):
+        of_kind = {choice.name: unit for choice, unit in stated.items() if choice.kind == kind}
+        if len(set(of_kind.values())) > 1:
             raise ValueError(
-                f"`units` must be the same for all channels of a kind; those of {kind} are {stated}. "
-                f"Convert one, or read them into two records."
+                f"`units` must be the same for all channels of a kind; those of {kind} are {of_kind} in "
+                f"{source}. Convert one, or read them into two records."
             )
-        unit = next(iter(stated.values()))
+        unit = next(iter(of_kind.values()))
         if unit is not None:
             result[kind] = unit
     return result
-
-
-def _listed(names: Iterable[str]) -> str:
-    shown = [repr(name) for name in names]
-    return ", ".join(shown[:30]) + (f" and {len(shown) - 30} more" if len(shown) > 30 else "") if shown else "nothing"

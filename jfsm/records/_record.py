@@ -1,9 +1,9 @@
 """A measured record: the clock, and what was read at each instant."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 from jfsm.records._channels import Columns, as_columns, as_single, as_time, frozen
 from jfsm.records._resample import resampled
 from jfsm.records._units import KINDS, coherent_units, find_unit
-from jfsm.records._write import write
+from jfsm.records._write import contents_of, write
 
 if TYPE_CHECKING:
     from jfsm.records._inspect import Inspection
+    from jfsm.records.formats.lookup import ChannelName
 
 Channel = NDArray[np.float64]
 ChannelArgument = ArrayLike | Mapping[int, ArrayLike] | None
@@ -286,6 +287,68 @@ class Record:
             If the suffix is not one of those that can be written.
         """
         write(self, Path(path))
+
+    @classmethod
+    def from_sep005(
+        cls,
+        channels: Mapping[str, Any] | Iterable[Mapping[str, Any]],
+        *,
+        force: "ChannelName" = None,
+        displacement: "ChannelName" = None,
+        velocity: "ChannelName" = None,
+        acceleration: "ChannelName" = None,
+        base_acceleration: str | None = None,
+        units: Mapping[str, str] | None = None,
+        sensitivity: Mapping[str, str] | None = None,
+        at_rest: bool = False,
+        drive: Drive = "force",
+        name: str | None = None,
+    ) -> "Record":
+        """The record in a list of channels after SEP 5 of SDyPy: dictionaries with `name`, `data`, `unit_str`, and
+        `time` [s] or `fs` [Hz].
+
+        The other arguments are those of `jfsm.read`: ``Record.from_sep005(channels, force="F1", acceleration="A1")``.
+        Without any name the channels called ``force``, ``displacement_2`` and the like are taken, else those whose
+        `quantity` is f, d, v or a, each kind numbered from 1.
+
+        Raises
+        ------
+        TypeError
+            If a channel is not a dictionary.
+        ValueError
+            If a channel lacks a key, two have one name, clocks differ, or a name is not among them.
+        """
+        from jfsm.records._read import record_of  # the reader makes records, a record only calls the reader
+        from jfsm.records.formats.sep005 import contents_of_channels
+
+        wanted: dict[str, ChannelName] = {
+            "force": force,
+            "displacement": displacement,
+            "velocity": velocity,
+            "acceleration": acceleration,
+            "base_acceleration": base_acceleration,
+        }
+        return record_of(
+            contents_of_channels(channels),
+            "`channels`",
+            wanted,
+            units=units or {},
+            sensitivity=sensitivity or {},
+            at_rest=at_rest,
+            drive=drive,
+            name=name,
+        )
+
+    def to_sep005(self) -> list[dict[str, Any]]:
+        """The channels after SEP 5 of SDyPy, called ``force_1`` and the like; `from_sep005` takes them back.
+
+        Each has `name`, `data`, `unit_str` and `quantity`, `fs` [Hz] if the clock is uniform, and `time` [s] if it is
+        not or does not begin at 0. Whether the structure was at rest, what drives it, the name and the notes are not
+        carried.
+        """
+        from jfsm.records.formats.sep005 import channels_of
+
+        return channels_of(contents_of(self))
 
     def _samples(self, kind: str) -> Channel | None:
         return self._columns[kind][1] if kind in self._columns else None

@@ -1,5 +1,7 @@
 """Units of channels: what a recorder wrote, and the coherent unit a record keeps."""
 
+import contextlib
+import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -26,7 +28,10 @@ _TABLE: dict[str, tuple[str, dict[str, float]]] = {
         "m/s²",
         {"m/s2": 1, "mm/s2": 1e-3, "cm/s2": 1e-2, "in/s2": _INCH, "ft/s2": _FOOT, "g": _GRAVITY, "mg": 1e-3 * _GRAVITY},
     ),
-    "force": ("N", {"N": 1, "mN": 1e-3, "kN": 1e3, "MN": 1e6, "lbf": _POUND, "lb": _POUND, "kip": 1e3 * _POUND}),
+    "force": (
+        "N",
+        {"N": 1, "mN": 1e-3, "kN": 1e3, "MN": 1e6, "kgf": _GRAVITY, "lbf": _POUND, "lb": _POUND, "kip": 1e3 * _POUND},
+    ),
     "torque": (
         "N m",
         {"Nm": 1, "mNm": 1e-3, "kNm": 1e3, "Nmm": 1e-3, "lbfft": _POUND * _FOOT, "lbfin": _POUND * _INCH},
@@ -84,6 +89,44 @@ def find_unit(text: str, kind: str) -> Unit:
             f"it was {text!r}. Convert the numbers before, and leave the unit out."
         )
     return unit
+
+
+class Sensitivity(NamedTuple):
+    """A sensor's reading for one unit of what it measures: value in `unit` = value as written / `size`.
+
+    The value as written is in `reading`, a raw unit (mV).
+    """
+
+    size: float
+    reading: str
+    unit: str
+
+
+_SENSITIVITY = re.compile(
+    r"^\s*(?P<size>[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?)\s*(?P<reading>[^\d\s/]+)\s*/\s*(?P<unit>.+?)\s*$"
+)
+
+
+def find_sensitivity(text: str, name: str, kind: str) -> Sensitivity:
+    """What a text as ``100 mV/g`` or ``22.4 mV/(m/s²)`` says of a channel of this kind.
+
+    Raises
+    ------
+    ValueError
+        If it is not a number, a raw unit, a slash and a unit of this kind.
+    """
+    match = _SENSITIVITY.match(text) if isinstance(text, str) else None
+    if match is not None:
+        given = Sensitivity(float(match["size"]), match["reading"], match["unit"].strip("()"))
+        with contextlib.suppress(ValueError):
+            is_raw = find_unit(given.reading, kind).quantity in _RAW
+            is_of_kind = find_unit(given.unit, kind).quantity not in _RAW
+            if given.size and is_raw and is_of_kind:
+                return given
+    raise ValueError(
+        f"`sensitivity` of {name} must be a number of raw units for one unit of {kind}, as '100 mV/g' or "
+        f"'2.25 mV/N'; it was {text!r}. Write it so, negative if the sensor points the other way."
+    )
 
 
 def is_unit(text: str) -> bool:

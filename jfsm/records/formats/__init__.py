@@ -4,11 +4,23 @@ from pathlib import Path
 
 from jfsm.records.formats.base import AbstractFormat
 from jfsm.records.formats.base import Contents as Contents
+from jfsm.records.formats.hdf5 import Hdf5Format
 from jfsm.records.formats.mat import MatFormat
+from jfsm.records.formats.mdf import MdfFormat
 from jfsm.records.formats.npz import NpzFormat
+from jfsm.records.formats.tdms import TdmsFormat
 from jfsm.records.formats.text import TextFormat
+from jfsm.records.formats.uff import UffFormat
 
-FORMATS: tuple[AbstractFormat, ...] = (TextFormat(), NpzFormat(), MatFormat())
+FORMATS: tuple[AbstractFormat, ...] = (
+    TextFormat(),
+    NpzFormat(),
+    MatFormat(),
+    Hdf5Format(),
+    UffFormat(),
+    TdmsFormat(),
+    MdfFormat(),
+)
 
 
 def format_of(path: Path) -> AbstractFormat:

@@ -1,4 +1,4 @@
-"""MATLAB files up to version 7."""
+"""MATLAB files, of version 7.3 (which are HDF5) and before."""
 
 import json
 from collections.abc import Iterator
@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 import scipy.io
 
-from jfsm.records.formats.base import ABOUT, AbstractFormat, Contents
+from jfsm.records.formats.base import ABOUT, AbstractFormat, Contents, Lazy
+from jfsm.records.formats.hdf5 import NUMERIC, dataset, opened
 
 
 class MatFormat(AbstractFormat):
@@ -19,13 +20,8 @@ class MatFormat(AbstractFormat):
     def load(self, path: Path) -> Contents:
         try:
             variables = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
-        except NotImplementedError as error:
-            raise ValueError(
-                f"{path.name} must be a MATLAB file of version 7 or earlier; it is of version 7.3, which is HDF5. "
-                f'Save it in MATLAB with save(..., "-v7").'
-            ) from error
-        except OSError:
-            raise
+        except NotImplementedError:
+            return _version_7_3(path)
         except Exception as error:  # whatever the reader stumbles over in bytes that are no such file
             raise ValueError(
                 f"{path.name} must be a MATLAB file; it cannot be opened as one ({error}), and may be cut short. "
@@ -52,5 +48,28 @@ def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
     if hasattr(value, "_fieldnames"):
         for field in value._fieldnames:
             yield from _leaves(f"{name}.{field}", getattr(value, field))
-    elif isinstance(value, int | float | np.ndarray | np.number) and np.asarray(value).dtype.kind in "iufcb":
+    elif isinstance(value, int | float | np.ndarray | np.number) and np.asarray(value).dtype.kind in NUMERIC:
         yield name, value
+
+
+def _version_7_3(path: Path) -> Contents:
+    """The same names and shapes as from an older file: MATLAB keeps structs as groups, and arrays transposed."""
+    demand = f"{path.name} must be a MATLAB file"
+    places: dict[str, str] = {}
+
+    def visit(place: str, item: Any) -> None:
+        if not hasattr(item, "dtype") or item.dtype.kind not in NUMERIC or place.startswith("#"):
+            return  # groups, cells, and what MATLAB files away under #refs#
+        is_text = item.attrs.get("MATLAB_class", b"double") in (b"char", "char")
+        is_sparse = "MATLAB_sparse" in item.parent.attrs  # its parts are indices and values
+        if not (is_text or is_sparse or "MATLAB_empty" in item.attrs):
+            places[place.replace("/", ".")] = place
+
+    with opened(path, demand) as file:
+        file.visititems(visit)
+
+    def array(name: str) -> np.ndarray:
+        with opened(path, demand) as file:
+            return np.squeeze(dataset(file, places[name]).T)
+
+    return Contents(Lazy(places, array))

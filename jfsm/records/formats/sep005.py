@@ -1,0 +1,83 @@
+"""Channels as dictionaries, after the SDyPy enhancement proposal 5 (unified time series)."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from jfsm.records.formats.base import Contents
+
+QUANTITIES = {"f": "force", "d": "displacement", "v": "velocity", "a": "acceleration"}
+NEEDED = ("name", "data", "unit_str")
+ROUNDING = 1e-6  # of a step: instants as close as this to those of a rate are not listed
+_LETTERS = {kind: letter for letter, kind in QUANTITIES.items()} | {"base_acceleration": "a"}
+
+
+def contents_of_channels(channels: Mapping[str, Any] | Iterable[Mapping[str, Any]]) -> Contents:
+    """What a list of channels holds; a single channel may come without a list.
+
+    Raises
+    ------
+    TypeError
+        If a channel is not a dictionary.
+    ValueError
+        If a channel lacks a key or two have one name.
+    """
+    given: list[Any] = [channels] if isinstance(channels, Mapping) else list(channels)
+    for place, channel in enumerate(given):
+        if not isinstance(channel, Mapping):
+            raise TypeError(
+                f"`channels` must hold dictionaries; number {place} is {type(channel).__name__}. See SEP 5 of SDyPy."
+            )
+        missing = [key for key in NEEDED if key not in channel]
+        if "time" not in channel and "fs" not in channel:
+            missing.append("time or fs")
+        if missing:
+            raise ValueError(
+                f"`channels` must hold dictionaries with name, data, unit_str, and time or fs; number {place} "
+                f"({channel.get('name')!r}) lacks {', '.join(missing)}. Add it."
+            )
+    names = [str(channel["name"]) for channel in given]
+    twins = sorted({name for name in names if names.count(name) > 1})
+    if twins:
+        raise ValueError(f"`channels` must have names of their own; {twins} occur more than once. Rename them.")
+    begun = sorted({str(channel["start_timestamp"]) for channel in given if channel.get("start_timestamp")})
+    return Contents(
+        {name: np.asarray(channel["data"]) for name, channel in zip(names, given, strict=True)},
+        {name: str(channel["unit_str"]) for name, channel in zip(names, given, strict=True) if channel["unit_str"]},
+        clocks={name: _clock(channel) for name, channel in zip(names, given, strict=True)},
+        kinds={
+            name: QUANTITIES[channel["quantity"]]
+            for name, channel in zip(names, given, strict=True)
+            if channel.get("quantity") in QUANTITIES
+        },
+        notes=(f"Measured from {', '.join(begun)}.",) if begun else (),
+    )
+
+
+def channels_of(contents: Contents) -> list[dict[str, Any]]:
+    """One dictionary for each channel of the contents of a record."""
+    instants = np.asarray(contents.arrays["time"])
+    step = float(instants[-1] - instants[0]) / (instants.size - 1)
+    counted = np.arange(instants.size) * step
+    even = bool(np.all(np.abs(instants - instants[0] - counted) < ROUNDING * step))
+    clock: dict[str, Any] = {"fs": 1.0 / step} if even else {}
+    if not even or abs(instants[0]) > ROUNDING * step:
+        clock["time"] = instants
+    return [
+        {
+            "name": name,
+            "data": np.array(array),
+            "unit_str": contents.units[name],
+            "quantity": _LETTERS[name.rstrip("0123456789").rstrip("_")],
+            **clock,
+        }
+        for name, array in contents.arrays.items()
+        if name != "time"
+    ]
+
+
+def _clock(channel: Mapping[str, Any]) -> np.ndarray:
+    if channel.get("time") is not None:
+        return np.asarray(channel["time"], dtype=np.float64)
+    return np.arange(len(channel["data"])) / float(channel["fs"])
