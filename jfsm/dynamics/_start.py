@@ -83,7 +83,8 @@ def _least_squares(model: Structure, head: Record, reconstruction: Reconstructio
         else:
             damp *= 100
         _, state, residual, slope = best
-        normal = slope.T @ slope
+        with np.errstate(over="ignore", invalid="ignore"):  # a start from which the motion runs away
+            normal = slope.T @ slope
         if not np.all(np.isfinite(normal)):
             break
         step = np.linalg.lstsq(normal + damp * np.diag(np.diag(normal)), -slope.T @ residual, rcond=None)[0]

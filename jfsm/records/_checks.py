@@ -8,15 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jfsm.records._defects import clipped, spikes
-from jfsm.records._noise_floor import SHORTEST, SPACINGS, NoiseFloor, noise_floor
+from jfsm.records._level import Level, level
+from jfsm.records._noise_floor import SHORTEST, SPACINGS, NoiseFloor
 from jfsm.records._quantisation import quantisation_step
+from jfsm.records._repeats import longest_hold, repetition
 
 Samples = NDArray[np.float64]
 
-OFFSET_SHARE = 0.05  # of the standard deviation: an offset worth a word
+OFFSET_SHARE = 0.025  # of the standard deviation: an offset worth a word
+DRIFT_SHARE = 0.1  # of the standard deviation: a drift over the record worth a word
+LEVEL_ERRORS = 4.0  # standard errors that offset and drift must have besides
 NOISY_SHARE = 0.1
 COARSE_SHARE = 0.1  # of the standard deviation: a quantisation step that shapes the signal
 FEW_PER_PERIOD = 8.0
+MOSTLY = 0.8  # share of the spikes that friction must account for
+FAST, FAST_SHARE = 0.125, 0.1  # of the sampling rate; of the power, above which a signal is near the band limit
 BANDS, NARROW = 10, 4  # bands of amplitude, and how few of them leave laws of amplitude indistinguishable
 VISITED = 0.01  # share of samples that makes a band visited
 
@@ -37,8 +43,10 @@ class ChannelSummary:
     ----------
     channel, unit : str
     minimum, maximum, mean, std : float
-    noise : float or None
-        Noise floor; None in a record too short to tell.
+    noise, noise_error : float or None
+        Noise floor and its standard error; None in a record too short to tell.
+    level : Level or None
+        Offset and drift with their standard errors; None without a signal.
     quantisation : float
         Step between levels, 0 for a continuous channel.
     clipped, spikes : int
@@ -49,6 +57,8 @@ class ChannelSummary:
         Strongest frequency [Hz].
     coverage : float or None
         Share of ten bands of amplitude, from rest to the largest motion, in which the channel spends time.
+    phase_plane : float or None
+        Share of the cells of a grid over the disc of the phase plane, ten across, that the channel enters.
     """
 
     channel: str
@@ -58,15 +68,26 @@ class ChannelSummary:
     mean: float
     std: float
     noise: float | None
+    noise_error: float | None
+    level: Level | None
     quantisation: float
     clipped: int
     spikes: int
     noise_only: bool
     frequency: float | None
     coverage: float | None
+    phase_plane: float | None
 
 
-def examine(channel: str, unit: str, raw: Samples, uniform: Samples, dt: float) -> tuple[ChannelSummary, list[Finding]]:
+def examine(
+    channel: str,
+    unit: str,
+    raw: Samples,
+    uniform: Samples,
+    dt: float,
+    floor: NoiseFloor | None,
+    turning: NDArray[np.bool_] | None = None,
+) -> tuple[ChannelSummary, list[Finding]]:
     """Figures and findings of one channel.
 
     Parameters
@@ -78,8 +99,13 @@ def examine(channel: str, unit: str, raw: Samples, uniform: Samples, dt: float) 
         The same channel on a uniform clock.
     dt : float
         Interval of that clock [s].
+    floor : NoiseFloor or None
+        Of `uniform`; None if it is too short to have one.
+    turning : (n,) bool array, optional
+        Samples at which the velocity changes its sign, where friction makes an acceleration jump.
     """
-    floor = noise_floor(uniform, dt) if uniform.size >= SHORTEST else None
+    smooth = None if floor is None or floor.silent else floor.smooth
+    torn = np.zeros(raw.size, dtype=bool) if floor is None else spikes(raw, floor.std)
     summary = ChannelSummary(
         channel=channel,
         unit=unit,
@@ -88,14 +114,23 @@ def examine(channel: str, unit: str, raw: Samples, uniform: Samples, dt: float) 
         mean=float(raw.mean()),
         std=float(raw.std()),
         noise=None if floor is None else floor.std,
+        noise_error=None if floor is None else floor.std_error,
+        level=None if smooth is None else level(uniform, dt),
         quantisation=quantisation_step(raw),
         clipped=int(clipped(raw).sum()),
-        spikes=0 if floor is None else int(spikes(raw, floor.std).sum()),
+        spikes=int(torn.sum()),
         noise_only=floor is not None and floor.silent,
-        frequency=None if floor is None or floor.silent else strongest_frequency(floor.smooth, dt),
-        coverage=None if floor is None or floor.silent else amplitude_coverage(floor.smooth),
+        frequency=None if smooth is None else strongest_frequency(smooth, dt),
+        coverage=None if smooth is None else amplitude_coverage(smooth),
+        phase_plane=None if smooth is None else phase_plane_coverage(smooth),
     )
-    found = [*_of_samples(summary, raw.size), *_of_noise(summary, floor), *_of_motion(summary, uniform.size * dt, dt)]
+    found = [
+        *_of_samples(summary, raw),
+        *_of_spikes(summary, torn, turning),
+        *_of_level(summary),
+        *_of_noise(summary, floor),
+        *_of_motion(summary, uniform.size * dt, dt),
+    ]
     return summary, found
 
 
@@ -103,6 +138,12 @@ def strongest_frequency(y: Samples, dt: float) -> float:
     """Frequency [Hz] of the largest line of the spectrum, the mean left out."""
     power = np.abs(np.fft.rfft((y - y.mean()) * np.hanning(y.size))) ** 2
     return float(np.fft.rfftfreq(y.size, dt)[1 + np.argmax(power[1:])])
+
+
+def fast_share(y: Samples) -> float:
+    """Share of the power, the mean left out, with fewer than eight samples a period."""
+    power = np.abs(np.fft.rfft((y - y.mean()) * np.hanning(y.size))) ** 2
+    return float(power[int(FAST * y.size) :].sum() / max(float(power.sum()), 1e-300))
 
 
 def amplitude_coverage(y: Samples) -> float:
@@ -114,8 +155,17 @@ def amplitude_coverage(y: Samples) -> float:
     return float(np.mean(counts > VISITED * y.size))
 
 
-def _of_samples(summary: ChannelSummary, n: int) -> Iterator[Finding]:
-    channel, unit, std = summary.channel, summary.unit, summary.std
+def phase_plane_coverage(y: Samples) -> float:
+    """Share of the cells, ten across, that a motion enters of the disc which its largest position and rate span."""
+    places = np.stack([y - y.mean(), np.gradient(y)])
+    places /= np.maximum(np.abs(places).max(axis=1, keepdims=True), 1e-300)
+    cells, edges, _ = np.histogram2d(*places, bins=BANDS, range=[[-1.0, 1.0], [-1.0, 1.0]])
+    centre = 0.5 * (edges[1:] + edges[:-1])
+    return float(np.mean(cells[np.hypot(*np.meshgrid(centre, centre)) <= 1.0] > 0))
+
+
+def _of_samples(summary: ChannelSummary, raw: Samples) -> Iterator[Finding]:
+    channel, unit, std, n = summary.channel, summary.unit, summary.std, raw.size
     if std == 0:
         yield Finding("warning", channel, f"Constant at {summary.mean:.4g} {unit}. Leave a dead channel out.")
         return
@@ -126,17 +176,49 @@ def _of_samples(summary: ChannelSummary, n: int) -> Iterator[Finding]:
             f"{summary.clipped} of {n} samples sit at the limit of {summary.minimum:.4g} or {summary.maximum:.4g} "
             f"{unit}: clipped. They carry no reading.",
         )
-    if summary.spikes:
-        message = f"{summary.spikes} of {n} samples are spikes, torn out of the curve beside them."
-        yield Finding("warning", channel, message)
-    if abs(summary.mean) > OFFSET_SHARE * std:
-        share = abs(summary.mean) / std
-        yield Finding("info", channel, f"Offset of {summary.mean:.4g} {unit}, {share:.0%} of the standard deviation.")
     if summary.quantisation:
         coarse = summary.quantisation > COARSE_SHARE * std
         steps = std / summary.quantisation
         message = f"Quantised in steps of {summary.quantisation:.4g} {unit}, {steps:.3g} to the standard deviation."
         yield Finding("warning" if coarse else "info", channel, message)
+    start, length = longest_hold(raw)
+    if length:
+        message = f"Holds one value for {length} samples from sample {start} on: the sensor hung. Leave them out."
+        yield Finding("warning", channel, message)
+    stride = repetition(raw)
+    if stride > 1:
+        message = f"Every value stands {stride} times: the channel was sampled more slowly. Resample the record."
+        yield Finding("info", channel, message)
+
+
+def _of_spikes(
+    summary: ChannelSummary, torn: NDArray[np.bool_], turning: NDArray[np.bool_] | None
+) -> Iterator[Finding]:
+    if not summary.spikes:
+        return
+    message = f"{summary.spikes} of {torn.size} samples are spikes, torn out of the curve beside them."
+    if turning is not None and turning[torn].mean() >= MOSTLY:
+        where = " They lie where the velocity changes its sign: friction leaves such."
+        yield Finding("info", summary.channel, message + where)
+    else:
+        yield Finding("warning", summary.channel, message)
+
+
+def _of_level(summary: ChannelSummary) -> Iterator[Finding]:
+    channel, unit, std = summary.channel, summary.unit, summary.std
+    if std == 0:
+        return
+    offset, error, drift, drift_error = summary.level or (summary.mean, 0.0, 0.0, 0.0)
+    if abs(offset) > max(OFFSET_SHARE * std, LEVEL_ERRORS * error):
+        doubt = f" ± {error:.1g}" if error else ""
+        message = f"Offset of {offset:.3g}{doubt} {unit}, {abs(offset) / std:.1%} of the standard deviation."
+        yield Finding("info", channel, message)
+    if abs(drift) > max(DRIFT_SHARE * std, LEVEL_ERRORS * drift_error):
+        message = (
+            f"Drifts by {drift:.3g} ± {drift_error:.1g} {unit} over the record, {abs(drift) / std:.1%} of the standard "
+            f"deviation. Take the trend off if it is the sensor's."
+        )
+        yield Finding("info", channel, message)
 
 
 def _of_noise(summary: ChannelSummary, floor: NoiseFloor | None) -> Iterator[Finding]:
@@ -151,10 +233,14 @@ def _of_noise(summary: ChannelSummary, floor: NoiseFloor | None) -> Iterator[Fin
         return
     share = floor.std / summary.std
     severity = "warning" if share > NOISY_SHARE else "info"
-    yield Finding(severity, channel, f"Noise of {floor.std:.3g} {unit}, {share:.2%} of the standard deviation.")
+    message = f"Noise of {floor.std:.3g} ± {floor.std_error:.1g} {unit}, {share:.2%} of the standard deviation."
+    yield Finding(severity, channel, message)
     if floor.spacing == SPACINGS[0]:
-        message = "The signal reaches the band limit: the noise may be partly signal. Sample faster if you can."
-        yield Finding("warning", channel, message)
+        if fast_share(floor.smooth) > FAST_SHARE:
+            message = "The signal reaches the band limit: the noise may be partly signal. Sample faster if you can."
+            yield Finding("warning", channel, message)
+        else:
+            yield Finding("info", channel, "Bends or jumps between samples, which the noise level leaves out.")
 
 
 def _of_motion(summary: ChannelSummary, duration: float, dt: float) -> Iterator[Finding]:

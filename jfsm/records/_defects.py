@@ -11,6 +11,7 @@ CLIPPED_SAMPLES_QUANTISED = 12
 CLIPPED_OVER_NEIGHBOUR = 3  # times the samples of the level next to the end of a quantised channel
 SWITCHING = 0.9  # share of samples at the two ends above which a signal is a switch, not a limited curve
 APPROACH, DECELERATION = 0.1, 0.4  # how fast, and how little slowed, a curve must meet a level that cuts it off
+VISITS, DISTINCT = 4, 0.99  # returns to the same level, and share of other values that occur once: a curve with noise
 SPIKE_ROBUST, SPIKE_FLOORS = 8.0, 6.0  # a spike is this many robust deviations and this many noise floors off
 SURROUNDING = 101  # samples in which the robust deviation is taken
 OUTSIDE = 0.75  # share of a spike's height that must stand out of the range of the samples beside it
@@ -34,7 +35,8 @@ def clipped(y: ArrayLike) -> NDArray[np.bool_]:
     Notes
     -----
     Six samples equal to the largest (or smallest) value are a limit, if the curve runs into it at speed. A structure
-    that dwells at its extreme position, is held before a release, or rests, comes to that level gently. A quantised
+    that dwells at its extreme position, is held before a release, or rests, comes to that level gently; but a curve
+    with noise, none of whose other values occurs twice, does not come back to one level four times. A quantised
     channel meets its end levels anyway: it needs twelve samples, and three times as many as the level beside. A channel
     that spends nine tenths of its time at both ends is a switch.
     """
@@ -118,7 +120,15 @@ def _at_level(y: NDArray[np.float64], level: float, inward: float, step: float) 
         enough = mask.sum() >= max(CLIPPED_SAMPLES_QUANTISED, CLIPPED_OVER_NEIGHBOUR * beside)
     else:
         enough = mask.sum() >= CLIPPED_SAMPLES
-    return mask if enough and _cut_off(y, mask, level) else nothing
+    return mask if enough and (_cut_off(y, mask, level) or _returns(y, mask)) else nothing
+
+
+def _returns(y: NDArray[np.float64], mask: NDArray[np.bool_]) -> bool:
+    """Whether a noisy curve comes back to exactly the same level again and again, as noise never does by itself."""
+    visits = int(np.count_nonzero(mask[1:] & ~mask[:-1]))
+    others = y[~mask]
+    distinct = np.unique(np.round((others - others.min()) / (1e-9 * float(np.ptp(y))))).size
+    return visits >= VISITS and distinct > DISTINCT * others.size
 
 
 def _cut_off(y: NDArray[np.float64], mask: NDArray[np.bool_], level: float) -> bool:

@@ -1,17 +1,32 @@
 """The first page of an examination: is this record what its owner thinks it is?"""
 
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.ndimage import binary_dilation
 
 from jfsm.records._checks import ChannelSummary, Finding, examine
-from jfsm.records._silence import silent_forces
+from jfsm.records._coherence import Coherence, coherence
+from jfsm.records._comparison import Comparison, Reading
+from jfsm.records._consistency import KINDS, comparisons, of_comparisons
+from jfsm.records._defects import clipped, spikes
+from jfsm.records._noise_floor import SHORTEST, noise_floor
+from jfsm.records._noise_spectrum import NoiseSpectrum, noise_spectrum
+from jfsm.records._periods import Periods, average
+from jfsm.records._plain import plain
+from jfsm.records._polarity import is_inverted
+from jfsm.records._repeats import copies
+from jfsm.records._silence import is_silent
 
 if TYPE_CHECKING:
     from jfsm.records._record import Record
 
 GAP, LONG_GAP = 1.5, 3.5  # median steps: from here on samples are missing; more than two in a row
+COHERENT = 0.9  # mean coherence below which it is worth a word
+SLOW = 0.1  # of the velocity's standard deviation: below, a point is about to turn
+DISTURBED = 2.0  # times the noise above the signal, that periods differ by
 
 
 @dataclass(frozen=True)
@@ -30,6 +45,14 @@ class Inspection:
         Figures of each channel.
     findings : tuple of Finding
         (severity, channel, message); severity is "info" or "warning".
+    comparisons : tuple of Comparison
+        Displacement, velocity and acceleration of each point against one another.
+    noise : tuple of NoiseSpectrum
+        Noise over frequency, of the channels that leave room to see it.
+    coherence : tuple of Coherence
+        Of each response with the driving channels.
+    periods : Periods or None
+        Averages over periods, of a record that repeats itself.
     """
 
     name: str | None
@@ -38,15 +61,14 @@ class Inspection:
     sample_rate: float
     channels: tuple[ChannelSummary, ...]
     findings: tuple[Finding, ...]
+    comparisons: tuple[Comparison, ...] = ()
+    noise: tuple[NoiseSpectrum, ...] = ()
+    coherence: tuple[Coherence, ...] = ()
+    periods: Periods | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers, text, lists and dictionaries, as JSON has them."""
-        plain = asdict(self)
-        return {
-            **plain,
-            "channels": list(plain["channels"]),
-            "findings": [finding._asdict() for finding in self.findings],
-        }
+        return plain(self)
 
     def print(self) -> None:
         """Show the page in the terminal."""
@@ -55,11 +77,13 @@ class Inspection:
 
         extent = f"{self.samples} samples over {self.duration:.6g} s at {self.sample_rate:.6g} Hz"
         table = Table(title=f"{self.name or 'Record'}: {extent}", title_justify="left")
-        for heading in ("channel", "unit", "minimum", "maximum", "mean", "s.d.", "noise"):
+        for heading in ("channel", "unit", "minimum", "maximum", "mean", "s.d.", "noise", "±"):
             table.add_column(heading, justify="left" if heading in ("channel", "unit") else "right", no_wrap=True)
         for row in self.channels:
             figures = (row.minimum, row.maximum, row.mean, row.std, row.noise)
-            table.add_row(row.channel, row.unit, *("–" if figure is None else f"{figure:.4g}" for figure in figures))
+            cells = ("–" if figure is None else f"{figure:.4g}" for figure in figures)
+            error = "–" if row.noise_error is None else f"{row.noise_error:.1g}"
+            table.add_row(row.channel, row.unit, *cells, error)
         console = Console()
         console.print(table)
         for severity, channel, message in self.findings:
@@ -68,35 +92,57 @@ class Inspection:
 
 
 def inspect(record: "Record") -> Inspection:
-    """Sampling, gaps, clipping, spikes, offsets, quantisation, noise and coverage of a record."""
-    steps = np.diff(record.time)
+    """All that a record shows by itself, with what is wrong first."""
     findings = [Finding("info", "record", note) for note in record.notes]
+    findings.extend(_of_the_clock(record))
+    uniform = record
     try:
-        uniform = record
         dt = record.dt
-    except ValueError as error:
-        findings.append(Finding("warning", "record", str(error)))
-        uniform = record.resample(1.0 / float(np.median(steps)))
+    except ValueError:  # said already
+        uniform = record.resample(1.0 / float(np.median(np.diff(record.time))))
         dt = uniform.dt
-    missing = np.flatnonzero(steps > GAP * np.median(steps))
-    if missing.size:
-        longest = int(np.argmax(steps))
-        long = steps[longest] > LONG_GAP * np.median(steps)
-        message = (
-            f"{missing.size} gaps, of at most {steps[longest]:.4g} s (after t = {record.time[longest]:.6g} s). "
-            f"{'Do not fit across it: cut the record there.' if long else 'Resampling bridges them.'}"
-        )
-        findings.append(Finding("warning" if long else "info", "record", message))
 
-    summaries = []
+    summaries: dict[str, ChannelSummary] = {}
+    readings: dict[str, Reading] = {}
+    spectra = []
     even = _every_channel(uniform)
     for channel, (unit, samples) in _every_channel(record).items():
-        summary, found = examine(channel, unit, samples, even[channel][1], dt)
-        summaries.append(summary)
+        y = even[channel][1]
+        floor = noise_floor(y, dt) if y.size >= SHORTEST else None
+        turning = _turning(record, channel) if channel.startswith("acceleration") else None
+        summaries[channel], found = examine(channel, unit, samples, y, dt, floor, turning)
         findings.extend(found)
-    findings.extend(_of_the_test(uniform))
-    rate = (len(record) - 1) / record.duration
-    return Inspection(record.name, len(record), record.duration, rate, tuple(summaries), tuple(findings))
+        if floor is None or np.ptp(y) == 0:
+            continue
+        readings[channel] = Reading(channel, y, floor.std, clipped(y) | spikes(y, floor.std))
+        spectra.append(noise_spectrum(channel, y, floor))
+    noise = tuple(spectrum for spectrum in spectra if spectrum is not None)
+    findings.extend(_of_spectra(noise, summaries))
+    findings.extend(_of_copies(readings))
+
+    silent = _silent(uniform, summaries)
+    findings.extend(_of_the_test(uniform, silent))
+    pairs, found = _of_points(uniform, readings, summaries, silent, dt)
+    findings.extend(found)
+    drives, responses = _causes_and_effects(uniform, readings, silent)
+    coherent = tuple(_coherences(drives, responses, summaries, dt))
+    findings.extend(_of_coherence(coherent))
+    driving, answering = ({name: one.samples for name, one in side.items()} for side in (drives, responses))
+    periods = average(driving, answering, dt)
+    if periods is not None:
+        findings.extend(_of_periods(periods, summaries))
+    return Inspection(
+        record.name,
+        len(record),
+        record.duration,
+        (len(record) - 1) / record.duration,
+        tuple(summaries.values()),
+        tuple(sorted(findings, key=lambda finding: finding.severity, reverse=True)),
+        pairs,
+        noise,
+        coherent,
+        periods,
+    )
 
 
 def _every_channel(record: "Record") -> dict[str, tuple[str, np.ndarray]]:
@@ -107,15 +153,171 @@ def _every_channel(record: "Record") -> dict[str, tuple[str, np.ndarray]]:
     return shown
 
 
-def _of_the_test(record: "Record") -> list[Finding]:
+def _of_the_clock(record: "Record") -> Iterator[Finding]:
+    """Uneven steps and gaps."""
+    steps = np.diff(record.time)
+    try:
+        _ = record.dt
+    except ValueError as error:
+        yield Finding("warning", "record", str(error))
+    missing = np.flatnonzero(steps > GAP * np.median(steps))
+    if missing.size:
+        longest = int(np.argmax(steps))
+        long = steps[longest] > LONG_GAP * np.median(steps)
+        message = (
+            f"{missing.size} gaps, of at most {steps[longest]:.4g} s (after t = {record.time[longest]:.6g} s). "
+            f"{'Do not fit across it: cut the record there.' if long else 'Resampling bridges them.'}"
+        )
+        yield Finding("warning" if long else "info", "record", message)
+
+
+def _turning(record: "Record", acceleration: str) -> np.ndarray | None:
+    """Samples within two of which the point of an accelerometer turns or stands; None if nothing tells its velocity."""
+    dof = int(acceleration.split()[1])
+    rate = record.channels.get(("velocity", dof))
+    if rate is None:
+        position = record.channels.get(("displacement", dof))
+        if position is None:
+            return None
+        rate = np.gradient(position, record.time)
+    slow = np.abs(rate - rate.mean()) < SLOW * rate.std()
+    slow[1:] |= np.diff(np.signbit(rate))
+    return binary_dilation(slow, iterations=2)
+
+
+def _silent(record: "Record", summaries: Mapping[str, ChannelSummary]) -> tuple[int, ...]:
+    """Dofs whose force is noise that no response follows."""
+    return tuple(
+        dof
+        for (kind, dof), force in record.channels.items()
+        if kind == "force"
+        and summaries[f"force {dof}"].noise_only
+        and is_silent(force, record.responses.values(), record.dt)
+    )
+
+
+def _of_the_test(record: "Record", silent: tuple[int, ...]) -> Iterator[Finding]:
     """What the channels together say of the kind of test."""
     forces = [dof for kind, dof in record.channels if kind == "force"]
-    silent = silent_forces(record)
-    findings = [
-        Finding("info", f"force {dof}", "Silent: noise that no response follows counts as zero.") for dof in silent
-    ]
+    for dof in silent:
+        yield Finding("info", f"force {dof}", "Silent: noise that no response follows counts as zero.")
     if not record.responses and record.drive == "force":
-        findings.append(Finding("warning", "record", "No response was measured: nothing can be compared with a model."))
+        yield Finding("warning", "record", "No response was measured: nothing can be compared with a model.")
     if len(silent) == len(forces) and record.base_acceleration is None:
-        findings.append(Finding("info", "record", "No force acts: the record is a free decay."))
-    return findings
+        yield Finding("info", "record", "No force acts: the record is a free decay.")
+
+
+def _of_copies(readings: Mapping[str, Reading]) -> Iterator[Finding]:
+    for one, other, factor in copies({name: reading.samples for name, reading in readings.items()}):
+        message = f"The same as {one} but for a factor of {factor:.6g}: one channel under two names. Leave one out."
+        yield Finding("warning", other, message)
+
+
+def _of_points(
+    record: "Record",
+    readings: Mapping[str, Reading],
+    summaries: Mapping[str, ChannelSummary],
+    silent: tuple[int, ...],
+    dt: float,
+) -> tuple[tuple[Comparison, ...], list[Finding]]:
+    """Channels of one point against one another, point after point."""
+    pairs, findings = [], []
+    for dof in range(1, record.dofs + 1):
+        names = [f"{kind} {dof}" for kind in KINDS]
+        motion = {
+            kind: _relative(readings[name], readings.get("base_acceleration"), kind)
+            for kind, name in zip(KINDS, names, strict=True)
+            if name in readings and not summaries[name].noise_only
+        }
+        here = comparisons(motion, dt)
+        found = list(of_comparisons(here, summaries, dt))
+        pairs.extend(here)
+        findings.extend(found)
+        inverted = {finding.channel for finding in found if finding.message.startswith("Inverted")}
+        trusted = [kind for kind in motion if f"{kind} {dof}" not in inverted]
+        force = readings.get(f"force {dof}")
+        if force is None or dof in silent or not trusted or any(pair.inverted for pair in here if not inverted):
+            continue
+        kind = trusted[0]
+        frequency = summaries[f"{kind} {dof}"].frequency
+        if frequency and is_inverted(force.samples, motion[kind].samples, KINDS.index(kind), dt, frequency):
+            message = (
+                f"Moves {kind} {dof} as if mass and stiffness were negative: turn the sign of the force, or of all "
+                f"motion of this point."
+            )
+            channel = f"force {dof}" if len(trusted) > 1 else f"force {dof}, {kind} {dof}"
+            findings.append(Finding("warning", channel, message))
+    return tuple(pairs), findings
+
+
+def _relative(reading: Reading, base: Reading | None, kind: str) -> Reading:
+    """The acceleration relative to the base, as displacement and velocity are."""
+    if base is None or kind != "acceleration":
+        return reading
+    noise = float(np.hypot(reading.noise, base.noise))
+    return Reading(reading.channel, reading.samples - base.samples, noise, reading.lost | base.lost)
+
+
+def _causes_and_effects(
+    record: "Record", readings: Mapping[str, Reading], silent: tuple[int, ...]
+) -> tuple[dict[str, Reading], dict[str, Reading]]:
+    """The channels that drive, and those that answer."""
+    quiet = {f"force {dof}" for dof in silent}
+    forces = {name: one for name, one in readings.items() if name.startswith("force ") and name not in quiet}
+    motion = {name: one for name, one in readings.items() if not name.startswith(("force ", "base"))}
+    if record.drive == "motion":
+        return motion, forces
+    base = {name: one for name, one in readings.items() if name == "base_acceleration"}
+    return forces | base, motion
+
+
+def _coherences(
+    drives: Mapping[str, Reading],
+    responses: Mapping[str, Reading],
+    summaries: Mapping[str, ChannelSummary],
+    dt: float,
+) -> Iterator[Coherence]:
+    """Of the responses whose strongest frequency the record resolves."""
+    for name, response in responses.items() if drives else ():
+        found = coherence(name, response.samples, [one.samples for one in drives.values()], response.noise, dt)
+        if found is not None and (summaries[name].frequency or np.inf) > 2.0 * found.resolution:
+            yield found
+
+
+def _of_coherence(found: tuple[Coherence, ...]) -> Iterator[Finding]:
+    for one in found:
+        if one.mean < COHERENT:
+            message = (
+                f"{one.mean:.0%} of it follows the drive linearly (mean coherence). The rest is nonlinear, noise, free "
+                f"motion, or a resonance narrower than {one.resolution:.3g} Hz."
+            )
+            yield Finding("info", one.channel, message)
+
+
+def _of_spectra(spectra: tuple[NoiseSpectrum, ...], summaries: Mapping[str, ChannelSummary]) -> Iterator[Finding]:
+    for spectrum in spectra:
+        if spectrum.coloured:
+            (first, *_, last), (low, *_, high) = spectrum.bands()
+            message = (
+                f"Noise is not white: {np.sqrt(low):.3g} {summaries[spectrum.channel].unit}/√Hz at {first:.3g} Hz, "
+                f"{np.sqrt(high):.3g} at {last:.3g} Hz. The noise level holds above the signal only."
+            )
+            yield Finding("info", spectrum.channel, message)
+
+
+def _of_periods(periods: Periods, summaries: Mapping[str, ChannelSummary]) -> Iterator[Finding]:
+    left = f"; {periods.transient} before them had not settled. Leave these out" if periods.transient else ""
+    message = f"Periodic: {periods.count} periods of {periods.samples} samples ({periods.seconds:.4g} s) agree{left}."
+    yield Finding("info", "record", message)
+    for one in periods.channels:
+        unit, floor = summaries[one.channel].unit, summaries[one.channel].noise
+        message = f"Changes by {one.noise:.3g} ± {one.noise_error:.1g} {unit} from period to period."
+        if floor is not None and one.noise > DISTURBED * floor:
+            message += (
+                f" That is {one.noise / floor:.1f} times its noise above the signal: count on it within the band."
+            )
+        yield Finding("info", one.channel, message)
+        for name, share in (("even", one.even), ("odd", one.odd)):
+            if share is not None:
+                size = f"{20 * np.log10(share):.0f} dB under the excited lines" if share else "none beyond noise"
+                yield Finding("info", one.channel, f"Distortion by {name} nonlinearities: {size}.")

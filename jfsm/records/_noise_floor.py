@@ -18,6 +18,10 @@ SHORTEST = 16  # samples; fewer cannot tell a quintic from its noise
 # The second moment of a standard normal variable confined to |z| < 2, by which the core of a sample is read.
 CORE = 2.0
 CORE_VARIANCE = 0.7737413035
+# Standard error of the floor: so many times that of white noise, for the choice of the spacing; and so much of what the
+# estimates differ by. Two such errors hold the truth in 98 of 100 channels of oscillators, with friction in 95.
+SCATTER, DISAGREEMENT = 1.5, 0.7
+FARTHEST = 0.25  # share of the floor that counts of a disagreement: jumps spoil two estimates, not the third
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,8 @@ class NoiseFloor:
         Samples between knots. At the finest, 2, the signal fills the band and `std` may contain part of it.
     dt : float
         Sampling interval [s].
+    std_error : float
+        Standard error of `std`.
     """
 
     std: float
@@ -46,6 +52,7 @@ class NoiseFloor:
     explained: float
     spacing: int
     dt: float
+    std_error: float
 
     @property
     def intensity(self) -> float:
@@ -99,12 +106,16 @@ def noise_floor(y: ArrayLike, dt: float) -> NoiseFloor:
     freedom = y.size - parameters
     variance = float(residual @ residual) / freedom
     std = np.sqrt(variance)
-    narrowest = min(
-        np.sqrt(y.size / freedom) * _core_std(residual),
-        _core_std(np.diff(y, 6)) / np.sqrt(924.0),  # 924: the sum of the squared binomial coefficients of order 6
+    narrowest, middle, _ = sorted(
+        (
+            std,
+            np.sqrt(y.size / freedom) * _core_std(residual),
+            _core_std(np.diff(y, 6)) / np.sqrt(924.0),  # 924: the sum of the squared binomial coefficients of order 6
+        )
     )
     if narrowest < INFLATED * std:
         std = narrowest
+    apart = min(max(middle, std) - narrowest, FARTHEST * std)
     total = float(np.var(y, ddof=1))
     smooth.flags.writeable = False
     return NoiseFloor(
@@ -114,6 +125,7 @@ def noise_floor(y: ArrayLike, dt: float) -> NoiseFloor:
         explained=max(0.0, 1.0 - variance / total) if total > 0 else 0.0,
         spacing=spacing,
         dt=float(dt),
+        std_error=float(np.hypot(SCATTER * std / np.sqrt(2.0 * freedom), DISAGREEMENT * apart)),
     )
 
 

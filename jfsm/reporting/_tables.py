@@ -159,7 +159,9 @@ def inspection_table(channels: Sequence[Dictionary]) -> Table:
         factor, unit = scale_for(
             max((abs(value) for value in values if value is not None), default=None), channel.get("unit")
         )
-        cells = (number(None if value is None else value / factor) for value in values)
+        cells = [number(None if value is None else value / factor) for value in values]
+        if channel.get("noise_error") is not None:
+            cells[-1] += f" ± {number(channel['noise_error'] / factor, 1)}"
         frequency = quantity(channel.get("frequency"), "Hz")
         rows.append((channel["channel"], unit or ABSENT, *cells, frequency))
     headings = ("channel", "unit", "minimum", "maximum", "mean", "s.d.", "noise", "strongest at")

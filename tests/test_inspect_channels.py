@@ -1,0 +1,155 @@
+"""What one channel, or the drive and a response, show: level, repeats, coherence, noise over frequency."""
+
+import numpy as np
+import pytest
+
+from jfsm.records import Record, clipped, noise_floor
+from jfsm.records._coherence import coherence
+from jfsm.records._level import level
+from jfsm.records._noise_spectrum import noise_spectrum
+from jfsm.records._repeats import copies, longest_hold, repetition
+
+DT, N = 0.01, 3000
+T = DT * np.arange(N)
+WAVE = np.sin(6.0 * T) + 0.5 * np.sin(11.0 * T)
+
+
+def white(seed, std=0.01, n=N):
+    return std * np.random.default_rng(seed).standard_normal(n)
+
+
+def messages(severity, channel="displacement 1", **channels):
+    found = Record(T, **channels).inspect().findings
+    return [finding.message for finding in found if (finding.severity, finding.channel) == (severity, channel)]
+
+
+def test_offset_and_drift_are_right_within_their_errors():
+    off = []
+    for seed in range(50):
+        found = level(WAVE + 0.1 + 0.3 * T / T[-1] + white(seed, 0.2), DT)
+        off.append(((found.offset - 0.25) / found.offset_error, (found.drift - 0.3) / found.drift_error))
+    assert np.abs(np.mean(off, axis=0)).max() < 0.5
+    assert 0.85 < np.mean(np.abs(off) < 2.0)
+    assert found.offset_error < 0.02 and found.drift_error < 0.1
+
+
+def test_slow_motion_widens_the_error_of_the_offset():
+    slow = WAVE + np.cumsum(white(1, 0.02))
+    assert level(slow, DT).offset_error > 10 * level(WAVE + white(1), DT).offset_error
+
+
+def test_a_drift_is_said_with_its_size():
+    (message,) = [words for words in messages("info", displacement=WAVE + 0.4 * T / T[-1]) if "Drifts" in words]
+    assert "Drifts by 0.4 ±" in message
+    assert not any("Drifts" in words for words in messages("info", displacement=WAVE + white(2)))
+
+
+def test_a_sensor_that_hung_is_warned_of():
+    y = WAVE + white(3)
+    y[1200:1212] = y[1200]
+    assert longest_hold(y) == (1200, 12)
+    assert any(
+        "12 samples from sample 1200 on: the sensor hung" in words for words in messages("warning", displacement=y)
+    )
+
+
+@pytest.mark.parametrize(
+    "y",
+    [
+        WAVE + white(4),
+        np.round((WAVE + white(4)) / 0.1) * 0.1,
+        np.arctan2(np.round(20 * WAVE), 50.0),
+        np.concatenate([np.zeros(300), WAVE[:-300]]),
+        np.clip(WAVE + white(4), -1.0, 1.0),
+        np.repeat(WAVE[::8] + white(4)[::8], 8),
+        np.sign(WAVE),
+    ],
+)
+def test_rest_clipping_steps_and_slow_samples_are_no_hang(y):
+    assert longest_hold(y) == (0, 0)
+
+
+def test_a_channel_sampled_more_slowly_is_told():
+    assert repetition(np.repeat(WAVE[::4], 4)) == 4
+    assert any(
+        "Every value stands 4 times" in words for words in messages("info", displacement=np.repeat(WAVE[::4], 4))
+    )
+    assert [repetition(y) for y in (WAVE, np.sign(WAVE), np.zeros(N), np.round(WAVE))] == [1, 1, 1, 1]
+
+
+def test_one_channel_under_two_names_is_warned_of():
+    y = WAVE + white(5)
+    assert list(copies({"a": y, "b": -2.0 * y, "c": y + white(6)})) == [("a", "b", pytest.approx(-2.0))]
+    found = messages("warning", "displacement 2", displacement={1: y, 2: y})
+    assert found == ["The same as displacement 1 but for a factor of 1: one channel under two names. Leave one out."]
+
+
+def test_coherence_is_the_share_that_follows_the_drives():
+    drives = [np.convolve(white(seed), np.ones(5), "same") for seed in (7, 8)]
+    clean = drives[0] - 0.5 * drives[1]
+    strange = np.convolve(white(9), np.ones(5), "same")
+    strange *= clean.std() / strange.std()
+    whole = coherence("x", clean, drives, 1e-9, DT)
+    half = coherence("x", clean + strange, drives, 1e-9, DT)
+    none = coherence("x", strange, drives, 1e-9, DT)
+    assert whole is not None and half is not None and none is not None
+    assert whole.mean > 0.999
+    assert half.mean == pytest.approx(0.5, abs=0.1)
+    assert none.mean < 0.1
+    assert coherence("x", clean[:200], [drives[0][:200]], 1e-9, DT) is None
+
+
+def test_a_response_that_does_not_follow_the_force_is_mentioned():
+    rng = np.random.default_rng(10)
+    lines = rng.uniform(3.0, 12.0, 30)
+    force, other = (np.cos(np.outer(T, lines * scale) + rng.uniform(0, 6, 30)).sum(1) for scale in (1.0, 1.013))
+    assert any("follows the drive linearly" in words for words in messages("info", force=force, displacement=other))
+    assert not any("linearly" in words for words in messages("info", force=force, displacement=force + white(11)))
+
+
+def test_noise_over_frequency_has_the_density_of_white_noise():
+    y = WAVE + white(12)
+    found = noise_spectrum("x", y, noise_floor(y, DT))
+    assert found is not None
+    assert found.density.mean() == pytest.approx(2 * 0.01**2 * DT, rel=0.1)
+    assert not found.coloured
+    assert found.frequency.min() > 11.0 / (2 * np.pi)
+
+
+def test_coloured_noise_is_told():
+    rough = np.diff(white(13, n=N + 1)) / np.sqrt(2)
+    assert any("Noise is not white" in words for words in messages("info", displacement=WAVE + rough))
+
+
+@pytest.mark.parametrize("std", [0.002, 0.02])
+def test_the_error_of_the_noise_holds_the_truth(std):
+    off = []
+    for seed in range(40):
+        noise = white(seed, std)
+        floor = noise_floor(WAVE + np.where(np.sin(1.9 * T) > 0, 0.3, 0.0) + noise, DT)
+        off.append((floor.std - noise.std()) / floor.std_error)
+    assert np.mean(np.abs(off) < 2.0) >= 0.9
+    assert np.abs(off).max() > 0.2  # an error as large as that would be no statement
+
+
+def test_a_noisy_crest_cut_off_at_one_level_is_clipped_however_gently_it_comes_there():
+    y = np.sin(6.0 * T) + white(14)
+    limit = np.quantile(y, 0.997)
+    np.testing.assert_array_equal(clipped(np.minimum(y, limit)), y >= limit)
+    assert not clipped(np.sin(2 * np.pi * np.arange(N) / 100)).any()
+
+
+def test_bends_are_not_taken_for_a_signal_at_the_band_limit():
+    bent = np.abs(np.sin(6.0 * T)) * np.sin(11.0 * T) + white(15, 1e-5)
+    assert noise_floor(bent, DT).spacing == 2
+    assert any("jumps between samples" in words for words in messages("info", displacement=bent))
+    assert messages("warning", displacement=bent) == []
+
+
+@pytest.mark.parametrize(("at", "severity"), [("turning", "info"), ("elsewhere", "warning")])
+def test_spikes_where_the_velocity_turns_are_put_down_to_friction(at, severity):
+    x = -np.cos(2 * np.pi * T)
+    acceleration = (2 * np.pi) ** 2 * np.cos(2 * np.pi * T) + white(16, 0.1)
+    acceleration[(100 if at == "turning" else 125) * np.arange(2, 8)] -= 60.0
+    found = messages(severity, "acceleration 1", displacement=x + white(17, 1e-3), acceleration=acceleration)
+    assert any("6 of 3000 samples are spikes" in words for words in found)
