@@ -1,6 +1,7 @@
 """Settings and fixtures of the whole suite: double precision, no silent broadcasting across ranks, seeded keys."""
 
 import os
+import tempfile
 from pathlib import Path
 
 import jax
@@ -9,6 +10,14 @@ from jaxtyping import Array, Key
 
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """One store of compiled programs for all processes of a run: what one has compiled, the others load."""
+    if "JAX_COMPILATION_CACHE_DIR" not in os.environ and not hasattr(config, "workerinput"):
+        store = tempfile.TemporaryDirectory(prefix="jfsm-programs-")
+        os.environ["JAX_COMPILATION_CACHE_DIR"] = store.name
+        config.add_cleanup(store.cleanup)
 
 
 @pytest.fixture
