@@ -19,10 +19,12 @@ _STEP_ANGLE = 0.22
 """Largest angle of the fastest mode per step [rad]: Runge-Kutta of order four then shifts a frequency by 2e-5."""
 _MOST_SUBSTEPS = 16
 _MOST_STIFF_SUBSTEPS = 64
-_STIFF_ANGLE = 1.0
-"""The same for what is faster than the linear part: it follows something slow, and need not be followed closely;"""
-CREST, _CREST_ANGLE = 3.0, 2.0
-"""at the largest speeds, this many times the usual one, it is over so soon that it need only stay stable."""
+PROBES = ((0.0, 1.0), (1.0, 1.0), (-1.0, 1.0), (3.0, 2.0), (-3.0, 2.0))
+"""Velocities, in usual speeds, at which to ask what is faster than the linear part, and its largest angle per step.
+
+It follows something slow, and need not be followed closely; at the largest speeds it is over so soon that it need only
+stay stable.
+"""
 _KINKED_SUBSTEPS = 2
 """Steps per sample at least for hidden states, which yield and slide at instants of their own."""
 _STABLE_ANGLE = 2.6
@@ -68,9 +70,8 @@ def substeps_for(structure: Structure, dt: float, speed: float = 0.0) -> int:
     most = _MOST_SUBSTEPS
     if len(plant.smooth) or len(plant.memory):
         need = max(need, _KINKED_SUBSTEPS if len(plant.memory) else 1)
-        for fast, angle in ((0.0, _STIFF_ANGLE), (speed, _STIFF_ANGLE), (CREST * speed, _CREST_ANGLE)):
-            rate = max(_fastest_rate(plant, zero + fast), _fastest_rate(plant, zero - fast))
-            need = max(need, rate * dt / angle)
+        for share, angle in PROBES:
+            need = max(need, _fastest_rate(plant, zero + share * speed) * dt / angle)
         most = _MOST_STIFF_SUBSTEPS
     return min(most, 2 ** math.ceil(math.log2(need)))
 

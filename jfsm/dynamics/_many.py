@@ -16,7 +16,7 @@ from ..records import Record
 from ..structures import MapTerm, Structure
 from ._drive import Reconstruction
 from ._excitation import (
-    CREST,
+    PROBES,
     bucket,
     excitation,
     force_limits,
@@ -207,8 +207,8 @@ def _fastest(structures: Sequence[Structure], record: Record) -> list[Structure]
     linear = np.block([[zero, one], [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)]])
     slopes = [linear]
     if len(plants.smooth) or len(plants.memory):
-        speeds = speed * np.array([0.0, 1.0, -1.0, CREST, -CREST])
-        slopes += [np.asarray(_jacobians(plants, jnp.full(mass.shape[-1], v))) for v in speeds]
+        probes = [jnp.full(mass.shape[-1], share * speed) for share, _ in PROBES]
+        slopes += [np.asarray(_jacobians(plants, v)) for v in probes]
     return [structures[int(np.argmax(np.max(np.abs(np.linalg.eigvals(slope)), axis=-1)))] for slope in slopes]
 
 

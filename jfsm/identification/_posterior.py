@@ -17,7 +17,7 @@ from ._nuisances import Nuisances
 from ._unknowns import Unknown
 
 LANES = 4
-"""Starts that run side by side where nothing sticks; a single one is doubled, so that one program serves all."""
+"""Starts that run side by side where nothing sticks; fewer are repeated, so that one program serves all."""
 _KNOWN_START, _HIDDEN_START = 1e-6, 0.3
 """Doubt about the initial state, and about hidden states there, as shares of the motion's size."""
 _WIDTHS = (12, 16, 20, 24, 32, 48, 64, 96, 128)
