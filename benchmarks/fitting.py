@@ -39,7 +39,13 @@ def examine(cause: str, seed: int, noise: float, excitations: Sequence[str]) -> 
     import jax  # only in the workers, whose environment is settled before it is loaded
 
     jax.config.update("jax_enable_x64", True)
+    import jax.monitoring
+
     import jfsm
+
+    if not _COMPILING:
+        jax.monitoring.register_event_duration_secs_listener(_count)
+        _COMPILING.append(0.0)
 
     challenge = _draw(cause, seed, noise, excitations)
     record = jfsm.Record(time=challenge.time, **challenge.channels, units=challenge.units, at_rest=challenge.at_rest)  # pyright: ignore[reportArgumentType]
@@ -57,9 +63,10 @@ def examine(cause: str, seed: int, noise: float, excitations: Sequence[str]) -> 
     names = [p.name for p in entry.effect.parameters if p.free]
     place = "-".join(map(str, challenge.at))
     try:
-        begin = time.perf_counter()
+        begin, before = time.perf_counter(), _COMPILING[0]
         found = jfsm.fit(believed + entry.effect(**start, at=challenge.at), record)
-        row["seconds"] = time.perf_counter() - begin
+        row["compile"] = _COMPILING[0] - before
+        row["seconds"] = time.perf_counter() - begin - row["compile"]
         best = jfsm.fit(believed + entry.effect(**numbers, at=challenge.at), record)
     except Exception as problem:  # one failed fit must not end the examination; the table lists it
         return row | {"error": f"{type(problem).__name__}: {problem}"[:300]}
@@ -74,6 +81,15 @@ def examine(cause: str, seed: int, noise: float, excitations: Sequence[str]) -> 
         for name in names
     }
     return row
+
+
+_COMPILING: list[float] = []
+"""Seconds that this process has traced and compiled, once it counts them."""
+
+
+def _count(event: str, seconds: float, **_: Any) -> None:
+    if event.startswith("/jax/core/compile/"):
+        _COMPILING[0] += seconds
 
 
 def _draw(cause: str, seed: int, noise: float, excitations: Sequence[str]) -> Challenge:
@@ -111,17 +127,18 @@ def covered(row: Row) -> list[bool]:
 
 
 def table(rows: Sequence[Row]) -> str:
-    lines = [f"{'cause':22s} fits  converged  intervals that cover   seconds (median)"]
+    lines = [f"{'cause':22s} fits  converged  intervals that cover   run (median), compile (largest) [s]"]
     total = [0, 0, 0, 0]
     for cause in dict.fromkeys(row["cause"] for row in rows):
         mine = [row for row in rows if row["cause"] == cause]
         good = [row for row in mine if "error" not in row]
         converged = sum(row["behind"] < BEHIND for row in good)
         inside = [c for row in good if row["behind"] < BEHIND for c in covered(row)]
-        seconds = np.median([row["seconds"] for row in good]) if good else math.nan
+        run = np.median([row["seconds"] for row in good]) if good else math.nan
+        compiling = max((row["compile"] for row in good), default=math.nan)
         lines.append(
             f"{cause:22s} {len(mine):4d}  {converged:4d} {converged / len(mine):5.0%}  "
-            f"{sum(inside):5d} of {len(inside):4d}            {seconds:8.1f}"
+            f"{sum(inside):5d} of {len(inside):4d}            {run:8.1f} {compiling:8.1f}"
         )
         total = [a + b for a, b in zip(total, (len(mine), converged, sum(inside), len(inside)), strict=True)]
     share = total[2] / total[3] if total[3] else math.nan

@@ -104,12 +104,15 @@ def acceleration(plant: Plant, minv, x, v, z, mode, g, t):
     return a, margin
 
 
-def mode_at(plant: Plant, minv, x, v, z, g, t):
-    """Mode of each friction slot in a state: the sign of its speed; at rest, whether it sticks or which way it goes."""
+def mode_at(plant: Plant, minv, x, v, z, g, t, still=False):
+    """Mode of each friction slot in a state: the sign of its speed; at rest, whether it sticks or which way it goes.
+
+    Slots that are known to be `still` are at rest whatever rounding made of their speeds.
+    """
     if not len(plant.friction):
         return jnp.zeros(0)
     speed = jnp.sum(plant.friction.direction * v[None, :], 1)
-    return _from_rest(plant, minv, x, v, z, g, t, jnp.sign(speed), jnp.zeros(speed.shape, bool))
+    return _from_rest(plant, minv, x, v, z, g, t, jnp.where(still, 0.0, jnp.sign(speed)), jnp.zeros(speed.shape, bool))
 
 
 def _from_rest(plant: Plant, minv, x, v, z, g, t, mode, broken):
@@ -162,10 +165,17 @@ def _in_mode(plant: Plant, minv, x, v, z, mode, load: Load, start, share):
 
 def advance(plant: Plant, minv, motion: Motion, load: Load) -> Motion:
     """Motion at the end of one step."""
+    end = Motion(*_in_mode(plant, minv, *motion, load, jnp.zeros(()), jnp.ones(())), motion.mode)
+    if not len(plant.friction):
+        return end
+    ended = acceleration(plant, minv, *end, load.force[2], load.time + load.step)[1] < 0
+    return jax.lax.cond(jnp.any(ended), lambda: _segments(plant, minv, motion, load), lambda: end)
+
+
+def _segments(plant: Plant, minv, motion: Motion, load: Load) -> Motion:
+    """Motion at the end of a step in which modes end."""
     x, v, z, mode = motion
     zero, one = jnp.zeros(()), jnp.ones(())
-    if not len(plant.friction):
-        return Motion(*_in_mode(plant, minv, x, v, z, mode, load, zero, one), mode)
 
     def segment(carry, last):
         x, v, z, mode, start = carry

@@ -31,6 +31,11 @@ from ..dynamics._stepper import (
 _HALVINGS = 3
 """Hidden states may relax fast: the series is taken for an eighth of the sample, and squared back."""
 
+_NOTHING = 1e-6
+"""Change of a resting link's speed that is none, as a share of what the process noise makes of it in a sample."""
+_SMALL = 8
+"""Columns of a matrix up to which its product is written out."""
+
 
 class Readings(eqx.Module):
     """What a filter sees of a record.
@@ -71,8 +76,11 @@ class Innovations(NamedTuple):
 
 
 def _product(a, b):
-    # As a sum of outer products: XLA fuses this into the loop, where a matrix product of this size would be a call.
-    return jnp.sum(a[:, :, None] * b[None, :, :], 1)
+    # Column by column: XLA fuses these sums into the loop, where a matrix product of this size would be a call, and all
+    # columns at once would be an array in memory as soon as several filters run side by side.
+    if b.shape[1] > _SMALL:
+        return a @ b
+    return jnp.stack([jnp.sum(a * b[:, j][None, :], 1) for j in range(b.shape[1])], 1)
 
 
 def innovations(
@@ -96,6 +104,8 @@ def innovations(
     variances = readings.variance * jnp.exp(log_scale)
     added = jnp.zeros((size, size)).at[dof : 2 * dof, dof : 2 * dof].set(noise.velocity)
     fine = punctual(plant, fine)
+    rows = plant.friction.direction
+    nothing = _NOTHING * jnp.sqrt(jnp.sum(rows[:, :, None] * noise.velocity[None] * rows[:, None, :], (1, 2)))
 
     def body(carry, inputs):
         motion, past, covariance = carry
@@ -106,9 +116,11 @@ def innovations(
         )
         x, v, z = mean[:dof], mean[dof : 2 * dof], mean[2 * dof :]
         # A link that sticks stays so while the update leaves it at rest; otherwise its speed decides.
-        motion = Motion(x, v, settle(plant, x, z), mode_at(plant, minv, x, v, z, g[0], time))
+        pushed = jnp.abs(jnp.sum(rows * (v - motion.v)[None, :], 1))
+        still = (motion.mode == 0) & (pushed <= nothing)
+        motion = Motion(x, v, settle(plant, x, z), mode_at(plant, minv, x, v, z, g[0], time, still))
         after = advance_sample(plant, minv, motion, g, base, time, dt)
-        step = _transition(plant, minv, motion, after, time, dt)
+        step = _transition(plant, minv, motion, after, time, dt, fine.substeps)
         propagated = _rest(plant, minv, _product(_product(step, updated), step.T) + added, after.mode)
         keep = valid > 0
         onward = (after, remember(past, x, v), propagated)
@@ -121,13 +133,16 @@ def innovations(
     return jax.lax.scan(body, (motion, past, start.covariance), inputs)[1]
 
 
-def _transition(plant, minv, before: Motion, after: Motion, time, dt):
-    """Derivative of the state after a sample by the state before it: exponential series of the mid-point slope."""
+def _transition(plant, minv, before: Motion, after: Motion, time, dt, substeps: int):
+    """Derivative of the state after a sample by the state before it: exponential of the mid-point slope.
+
+    Its series is taken for a step as short as those of the mean, and squared back.
+    """
     dof, hidden = plant.dof, plant.hidden
     x, v, z = ((a + b) / 2 for a, b in zip(before[:3], after[:3], strict=True))
     rates = jacobian(plant, minv, x, v, z, time + dt / 2)
     held = _held(plant, minv, rates[dof : 2 * dof], (before.mode == 0) & (after.mode == 0))
-    halvings = _HALVINGS if hidden else 0
+    halvings = (substeps - 1).bit_length()
     exponent = dt / 2**halvings * jnp.concatenate([rates[:dof], held, rates[2 * dof :]], 0)
     square = _product(exponent, exponent)
     cube, fourth = _product(square, exponent), _product(square, square)

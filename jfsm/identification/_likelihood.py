@@ -45,9 +45,16 @@ def _run(
     return innovations(with_vector(plant, numbers), show, fine, readings, noise, start, tail[2 * dof :])
 
 
-def _axes(plant: Plant):
+def _each(one, plant: Plant, lanes: Lanes, theta):
+    """What `one` makes of every lane."""
     # Values and places differ between lanes; which law stands in a slot does not, so that it stays a branch.
-    return jax.tree.map(lambda leaf: 0 if jnp.issubdtype(leaf.dtype, jnp.floating) else None, plant)
+    axes = jax.tree.map(lambda leaf: 0 if jnp.issubdtype(leaf.dtype, jnp.floating) else None, plant)
+    mapped = (lanes.base, lanes.rows, lanes.unit, lanes.log, theta)
+    if theta.shape[0] > 1:
+        return jax.vmap(one, in_axes=(axes, 0, 0, 0, 0, 0))(plant, *mapped)
+    # One lane alone is not mapped, so that what rarely happens (a reversal) is a branch as well.
+    alone = jax.tree.map(lambda leaf: leaf[0] if jnp.issubdtype(leaf.dtype, jnp.floating) else leaf, plant)
+    return jax.tree.map(lambda found: found[None], one(alone, *(leaf[0] for leaf in mapped)))
 
 
 @eqx.filter_jit
@@ -78,8 +85,7 @@ def derivatives(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, 
         stretches = jnp.sum(scores.reshape(theta.size, counted.shape[0], -1), 2) @ inside
         return value, jnp.sum(scores, 1), de @ de.T + 0.5 * ds @ ds.T, stretches @ stretches.T
 
-    mapped = jax.vmap(one, in_axes=(_axes(plant), 0, 0, 0, 0, 0))
-    return mapped(plant, lanes.base, lanes.rows, lanes.unit, lanes.log, theta)
+    return _each(one, plant, lanes, theta)
 
 
 @eqx.filter_jit
@@ -89,6 +95,4 @@ def predictions(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, 
     def one(plant, base, rows, unit, log, theta):
         return _run(plant, (base, rows, unit, log), theta, show, fine, readings, noise, doubt)
 
-    return jax.vmap(one, in_axes=(_axes(plant), 0, 0, 0, 0, 0))(
-        plant, lanes.base, lanes.rows, lanes.unit, lanes.log, theta
-    )
+    return _each(one, plant, lanes, theta)

@@ -19,6 +19,8 @@ _ENOUGH = 0.01
 """A step that promises less than this many nats is the last,"""
 _HOPELESS = 0.02
 """or less than this share of what the start is behind the best value known."""
+_PATIENCE = 4
+"""Lanes that climb below a top that another has reached get so many times the steps that it took."""
 _WALL = 1e-3
 """Damping of a step that is to come down from the wall of a valley, not to go along it."""
 _LONGEST = 1.0
@@ -106,7 +108,8 @@ def _climb(
     beyond, astray = here, np.zeros(lanes, bool)
     damp = np.full(lanes, 1e-3)
     open_, results = np.ones(lanes, bool), [Result.maximum_steps] * lanes
-    for _ in range(steps):
+    last, reached = steps, np.inf
+    for step in range(steps):
         start = beyond.where(astray, here)
         damping = np.where(astray, np.maximum(damp, _WALL), damp)
         move, promise = _steps(start, damping, low, high, log)
@@ -116,9 +119,10 @@ def _climb(
             # A negative promise is no sign of a top, but of a step that its bounds bent: a shorter one will do.
             if 0 <= promise[lane] < enough + _HOPELESS * max(behind, 0.0) and damp[lane] < 1.0:
                 open_[lane], results[lane] = False, Result.successful
+                last, reached = min(last, _PATIENCE * (step + 1)), min(reached, here.value[lane])
             elif damp[lane] > 1e8:
                 open_[lane], results[lane] = False, Result.stalled
-        if not np.any(open_):
+        if not np.any(open_) or (step >= last and not np.any(open_ & (here.value < reached))):
             break
         trial = np.where(open_[:, None], start.theta + move, here.theta)
         there = _Place(trial, *_finite(posterior.evaluate(trial, slack, most)))

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..dynamics._plant import Grid, Plant, hidden_width, lower
 from ..estimation._filter import Innovations, ProcessNoise
-from ..structures import AbstractFriction, Structure
+from ..structures import AbstractFriction, ChannelDelay, ForceDelay, Structure
 from ._layout import plant_rows, plant_vector
 from ._likelihood import Lanes, derivatives, predictions
 from ._nuisances import Nuisances
@@ -24,8 +24,14 @@ _WIDTHS = (12, 16, 20, 24, 32, 48, 64, 96, 128)
 
 
 def lanes_of(structure: Structure) -> int:
-    """Starts of such a structure that run side by side: reversals make a lane dear, and a program slow to compile."""
-    return 1 if any(isinstance(term, AbstractFriction) for term in structure.terms) else LANES
+    """Starts of such a structure that run side by side.
+
+    Where links stick, one alone: a reversal is a branch then, which costs nothing while there is none. And one where a
+    sensor is late, which has no second start.
+    """
+    sticks = any(isinstance(term, AbstractFriction) for term in structure.terms)
+    late = any(isinstance(sensor, ForceDelay | ChannelDelay) for sensor in structure.sensors)
+    return 1 if sticks or late else LANES
 
 
 @dataclass(frozen=True)
