@@ -190,7 +190,7 @@ def _segments(plant: Plant, minv, motion: Motion, load: Load) -> Motion:
         now = start + left * share
         switching = ended & (shares == share)
         rows = plant.friction.direction
-        vs = vs - _remove(minv, rows, jnp.sum(rows * vs[None, :], 1), switching & (mode != 0))
+        vs = vs - stopping(minv, rows, jnp.sum(rows * vs[None, :], 1), switching & (mode != 0))
         resting = jnp.where(switching, 0.0, mode)
         broken = switching & (mode == 0)
         decided = _from_rest(plant, minv, xs, vs, zs, load.at(now), load.time + now * load.step, resting, broken)
@@ -203,7 +203,7 @@ def _segments(plant: Plant, minv, motion: Motion, load: Load) -> Motion:
     return Motion(x, v, z, mode)
 
 
-def _remove(minv, rows, speed, stopped):
+def stopping(minv, rows, speed, stopped):
     """Velocity that must go for the stopped links to be at rest exactly."""
     effect = jnp.sum(minv[None, :, :] * rows[:, None, :], 2)
     scale = jnp.sum(rows * effect, 1)

@@ -26,6 +26,7 @@ from ..dynamics._stepper import (
     inverse_mass,
     jacobian,
     mode_at,
+    stopping,
 )
 
 _HALVINGS = 3
@@ -112,12 +113,14 @@ def innovations(
         force, base, time, y, use, valid = inputs
         g = load_of(plant, minv, motion, past, force, base, time, dt)
         mean, updated, error, spread = _update(
-            plant, minv, show, motion, covariance, Load(g[:3], base[:3], time, dt / fine.substeps), y, use, variances
-        )
+            plant, minv, show, motion, covariance, Load(g[:3], base[:3], time, dt / fine.substeps), y, use, variances,
+            nothing,
+        )  # fmt: skip
         x, v, z = mean[:dof], mean[dof : 2 * dof], mean[2 * dof :]
         # A link that sticks stays so while the update leaves it at rest; otherwise its speed decides.
         pushed = jnp.abs(jnp.sum(rows * (v - motion.v)[None, :], 1))
         still = (motion.mode == 0) & (pushed <= nothing)
+        v = v - stopping(minv, rows, jnp.sum(rows * v[None, :], 1), still)
         motion = Motion(x, v, settle(plant, x, z), mode_at(plant, minv, x, v, z, g[0], time, still))
         after = advance_sample(plant, minv, motion, g, base, time, dt)
         step = _transition(plant, minv, motion, after, time, dt, fine.substeps)
@@ -174,8 +177,9 @@ def _rest(plant, minv, covariance, mode):
     return covariance
 
 
-def _update(plant, minv, show, motion: Motion, covariance, load: Load, y, use, variances):
-    """State after the readings of one sample, and their innovations; `load` is that of the sample's first step."""
+def _update(plant, minv, show, motion: Motion, covariance, load: Load, y, use, variances, nothing):
+    """State after the readings of one sample, and their innovations; `load` is that of the sample's first step, and
+    speeds of links up to `nothing` are none."""
     mean = jnp.concatenate([motion.x, motion.v, motion.z])
     errors, spreads = [], []
     for c in range(y.shape[0]):
@@ -184,7 +188,7 @@ def _update(plant, minv, show, motion: Motion, covariance, load: Load, y, use, v
             predicted, row = _late(plant, minv, show, c, mean, motion.mode, load)
         else:
             predicted, row = _predict(
-                plant, minv, show, c, mean, covariance, motion.mode, load, y[c], variances[c], gain
+                plant, minv, show, c, mean, covariance, motion.mode, load, y[c], variances[c], gain, nothing
             )
         error = y[c] - gain * predicted - plant.channel_offset[c]
         row = gain * row
@@ -198,7 +202,7 @@ def _update(plant, minv, show, motion: Motion, covariance, load: Load, y, use, v
     return mean, covariance, jnp.stack(errors), jnp.stack(spreads)
 
 
-def _predict(plant, minv, show, c, mean, covariance, mode, load: Load, y, variance, gain):
+def _predict(plant, minv, show, c, mean, covariance, mode, load: Load, y, variance, gain, nothing):
     """Reading of channel `c` without gain and offset, and its derivative by the state."""
     dof = plant.dof
     select, none, hidden = show.select[c], jnp.zeros(dof), jnp.zeros(plant.hidden)
@@ -207,7 +211,7 @@ def _predict(plant, minv, show, c, mean, covariance, mode, load: Load, y, varian
     if show.kinds[c] == "velocity":
         return jnp.sum(select * mean[dof : 2 * dof]), jnp.concatenate([none, select, hidden])
     if len(plant.friction) == 1:
-        a, by_state = _most_probable_mode(plant, minv, select, c, mean, covariance, load, y, variance, gain)
+        a, by_state = _most_probable_mode(plant, minv, select, c, mean, covariance, load, y, variance, gain, nothing[0])
     else:
         a, by_state = _acceleration_and_slope(plant, minv, mean, mode, load)
     return jnp.sum(select * (a + load.base[0])), jnp.sum(select[:, None] * by_state, 0)
@@ -258,13 +262,14 @@ def _held(plant, minv, by_state, sticking):
     return by_state
 
 
-def _most_probable_mode(plant, minv, select, c, mean, covariance, load: Load, y, variance, gain):
+def _most_probable_mode(plant, minv, select, c, mean, covariance, load: Load, y, variance, gain, nothing):
     """Acceleration and slope in the mode that the reading and the estimated speed make most probable."""
     dof = plant.dof
     row = plant.friction.direction[0]
     x, v, z = mean[:dof], mean[dof : 2 * dof], mean[2 * dof :]
     speed = jnp.sum(row * v)
-    spread = jnp.sqrt(jnp.maximum(jnp.sum(row[:, None] * covariance[dof : 2 * dof, dof : 2 * dof] * row[None, :]), 0.0))
+    power = jnp.sum(row[:, None] * covariance[dof : 2 * dof, dof : 2 * dof] * row[None, :])
+    spread = jnp.sqrt(jnp.maximum(power, 0.0) + nothing**2)
     certain = jnp.where(spread > 0, speed / jnp.where(spread > 0, spread, 1.0), jnp.sign(speed) * 40.0)
     low, high = friction_limits(plant, x, jnp.zeros(dof), load.time)
     free = free_acceleration(plant, minv, x, v, z, load.force[0], load.time)

@@ -1,7 +1,9 @@
-"""Linear Gaussian motion on a grid: likelihood of its readings, and the Rauch-Tung-Striebel smoother.
+"""Linear Gaussian motion on a grid: likelihood of its readings, and the state given all of them.
 
-H. E. Rauch, F. Tung, C. T. Striebel, AIAA J. 3 (1965) 1445-1450.
+The smoother is that of G. J. Bierman, Automatica 9 (1973) 503-508, which inverts nothing.
 """
+
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -10,9 +12,10 @@ from jaxtyping import Array, Float
 
 
 class LinearModel(eqx.Module):
-    """From sample to sample s ← step s + pushed + N(0, noise); readings are rows s + N(0, variance).
+    """From sample to sample s ← step s + pushed + N(0, noise + swell wander); readings are rows s + N(0, variance).
 
-    At the first sample s is N(0, start). Channels are taken one after the other, so that no matrix is inverted.
+    At the first sample s is N(0, start). `swell` (n,) differs from step to step; without `wander` there is none.
+    Channels are taken one after the other, so that no matrix is inverted.
     """
 
     step: Float[Array, "state state"]
@@ -20,15 +23,25 @@ class LinearModel(eqx.Module):
     rows: Float[Array, "channels state"]
     variance: Float[Array, " channels"]
     start: Float[Array, "state state"]
+    wander: Float[Array, "state state"] | None = None
 
 
-def _filtered(model: LinearModel, pushed, seen, use):
-    """Moments at every sample, predicted and then updated, and the log-likelihood of its readings."""
+class _Filtered(NamedTuple):
+    """Moments predicted for every sample; error, variance and gain of every reading; log-likelihood of a sample's."""
 
+    mean: Float[Array, "n state"]
+    covariance: Float[Array, "n state state"]
+    error: Float[Array, "n channels"]
+    spread: Float[Array, "n channels"]
+    weight: Float[Array, "n channels state"]
+    total: Float[Array, " n"]
+
+
+def _filtered(model: LinearModel, pushed, seen, use, swell) -> _Filtered:
     def body(carry, inputs):
-        mean, covariance = carry
-        push, y, counted = inputs
-        predicted, total = (mean, covariance), jnp.zeros(())
+        mean, covariance = predicted = carry
+        push, y, counted, swell = inputs
+        total, readings = jnp.zeros(()), []
         for c in range(y.shape[0]):
             row = model.rows[c]
             cross = jnp.sum(covariance * row[None, :], 1)
@@ -37,11 +50,15 @@ def _filtered(model: LinearModel, pushed, seen, use):
             weight = counted[c] * cross / spread
             mean, covariance = mean + weight * error, covariance - weight[:, None] * cross[None, :]
             total = total - 0.5 * counted[c] * (error**2 / spread + jnp.log(2 * jnp.pi * spread))
-        onward = (model.step @ mean + push, model.step @ covariance @ model.step.T + model.noise)
-        return onward, (*predicted, mean, covariance, total)
+            readings.append((error, spread, weight))
+        noise = model.noise if model.wander is None else model.noise + swell * model.wander
+        onward = (model.step @ mean + push, model.step @ covariance @ model.step.T + noise)
+        error, spread, weight = (jnp.stack(each) for each in zip(*readings, strict=True))
+        return onward, _Filtered(*predicted, error, spread, weight, total)
 
     start = (jnp.zeros(model.start.shape[0]), model.start)
-    return jax.lax.scan(body, start, (pushed, seen, use))[1]
+    swell = jnp.ones(len(seen)) if swell is None else swell
+    return jax.lax.scan(body, start, (pushed, seen, use, swell))[1]
 
 
 def log_likelihood(
@@ -49,9 +66,10 @@ def log_likelihood(
     pushed: Float[Array, "n state"],
     seen: Float[Array, "n channels"],
     use: Float[Array, "n channels"],
+    swell: Float[Array, " n"] | None = None,
 ) -> Float[Array, ""]:
     """Of readings `seen`, less what is known of them beforehand; those with ``use = 0`` do not count."""
-    return jnp.sum(_filtered(model, pushed, seen, use)[-1])
+    return jnp.sum(_filtered(model, pushed, seen, use, swell).total)
 
 
 def smoothed(
@@ -60,23 +78,28 @@ def smoothed(
     seen: Float[Array, "n channels"],
     use: Float[Array, "n channels"],
     watch: Float[Array, "watched state"],
+    swell: Float[Array, " n"] | None = None,
 ) -> tuple[Float[Array, "n watched"], Float[Array, "n watched watched"]]:
     """Mean and covariance of ``watch s`` at every sample, given all readings."""
-    ahead, spread_ahead, mean, covariance, _ = _filtered(model, pushed, seen, use)
 
-    def shown(mean, covariance):
-        return watch @ mean, watch @ covariance @ watch.T
+    filtered = _filtered(model, pushed, seen, use, swell)
 
     def body(carry, inputs):
-        later, spread_later = carry
-        ahead, spread_ahead, mean, covariance = inputs
-        weight = jnp.linalg.solve(spread_ahead, model.step @ covariance).T
-        mean = mean + weight @ (later - ahead)
-        covariance = covariance + weight @ (spread_later - spread_ahead) @ weight.T
-        return (mean, covariance), shown(mean, covariance)
+        # Slope and curvature of minus the log-likelihood of this and all later readings, by the state predicted here.
+        slope, curvature = carry
+        sample, counted = inputs
+        for c in reversed(range(len(model.rows))):
+            row, gain = model.rows[c], sample.weight[c]
+            told = counted[c] / sample.spread[c]
+            # (I - gain row)ᵀ from the left, and on both sides
+            slope = slope - row * jnp.sum(gain * slope) - row * told * sample.error[c]
+            across = jnp.sum(curvature * gain[None, :], 1)
+            curvature = curvature - row[:, None] * across[None, :] - across[:, None] * row[None, :]
+            curvature = curvature + row[:, None] * row[None, :] * (jnp.sum(gain * across) + told)
+        spread = watch @ sample.covariance
+        shown = watch @ sample.mean - spread @ slope, spread @ watch.T - spread @ curvature @ spread.T
+        return (model.step.T @ slope, model.step.T @ curvature @ model.step), shown
 
-    last = (mean[-1], covariance[-1])
-    inputs = (ahead[1:], spread_ahead[1:], mean[:-1], covariance[:-1])
-    _, (means, covariances) = jax.lax.scan(body, last, inputs, reverse=True)
-    end_mean, end_covariance = shown(*last)
-    return jnp.concatenate([means, end_mean[None]]), jnp.concatenate([covariances, end_covariance[None]])
+    state = model.start.shape[0]
+    end = (jnp.zeros(state), jnp.zeros((state, state)))
+    return jax.lax.scan(body, end, (filtered, use), reverse=True)[1]

@@ -1,6 +1,4 @@
-r"""Displacement, velocity and acceleration from whatever was measured of them.
-
-    ẍ = -K x - C ẋ + B g - r,     r: a random force with a memory,     y = (x, v, ẍ) + bias + noise
+"""Displacement, velocity and acceleration from whatever was measured of them.
 
 The smoother of paper eqs. 70-71 drives a double integrator by one measured acceleration. Here every channel is a
 reading, and the motion is that of a resonator with a random force, as a structure's is, so that a channel that is
@@ -8,14 +6,11 @@ missing can be told from the others. All its numbers (stiffness, damping, how th
 of the random force, noise of each channel) are the most probable ones of the record.
 """
 
-from dataclasses import dataclass
-from functools import partial
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
 
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import minimize
 
 from .._types import require_x64
@@ -24,7 +19,7 @@ from ..dynamics._excitation import bucket, measured_force
 from ..dynamics._simulate import check_pair
 from ..records import Record, clipped, noise_floor, spikes
 from ..structures import Structure
-from ._kalman import LinearModel, log_likelihood, smoothed
+from ._resonator import Data, Kind, Numbers, cost, motion
 
 _RESPONSES = ("displacement", "velocity", "acceleration")
 _LEARNED = 8192
@@ -35,9 +30,17 @@ _FINEST, _OVERSAMPLED = 2, 3
 _LEAST_NOISE = 1e-4
 _FULL_BAND = 1e-3
 """Noise of a force whose signal fills its band, as a share of its size at most: nothing in it tells."""
+_SMOOTHER = (1, 2)
+"""Derivatives that the random force may have instead of none."""
+_CYCLES = (1.0, 4.0)
+"""Cycles of the motion over which the random force may swell or fade."""
+_LEAST_SWELL = 1e-4
 _SEARCH = {"maxiter": 80, "ftol": 1e-8}
-_BIAS, _WIDE, _AT_REST = 0.3, 10.0, 1e-6
-"""Standard deviations beforehand: of a bias in sizes of its channel, of the first state in sizes of the motion."""
+_NO_VALUE = 1e20
+_STRANGE = 5.0
+"""Standard errors from which a spike is no part of the motion."""
+_WIDE, _AT_REST = 10.0, 1e-6
+"""Standard deviation of the first state beforehand, in sizes of the motion."""
 
 
 @dataclass(frozen=True)
@@ -96,8 +99,9 @@ def estimate_motion(record: Record, model: Structure | None = None) -> Motion:
 
     Notes
     -----
-    The random force is a process of Matérn's family with ν = 1/2 or 3/2, whichever makes the record more probable: the
-    rougher follows the jumps that dry friction makes, and leaves a wider error band elsewhere.
+    The random force is a process of Matérn's family with ν = 1/2, 3/2 or 5/2, whichever makes the record most probable:
+    the roughest follows the jumps that dry friction makes, and leaves a wider error band elsewhere. Where a motion
+    grows or dies away, the random force does so with it.
     """
     require_x64()
     if not record.responses:
@@ -119,50 +123,14 @@ def estimate_motion(record: Record, model: Structure | None = None) -> Motion:
     return _together(record, [_Part.of_dof(record, j) for j in range(1, dof + 1)], dof)
 
 
-class _Kind(NamedTuple):
-    """What a compiled program is made for.
-
-    `channels` are the order of differentiation and the index of the degree of freedom of each; `learned` tells whether
-    stiffness, damping and gains are among the numbers; `smooth`, which random force there is.
-    """
-
-    channels: tuple[tuple[int, int], ...]
-    dof: int
-    inputs: int
-    learned: bool
-    smooth: bool
-
-
-class _Numbers(NamedTuple):
-    """What is learned; logarithms but for `gain`, in units of the motion's size and rate."""
-
-    stiffness: Any
-    damping: Any
-    gain: Any
-    memory: Any
-    size: Any
-    noise: Any
-
-    @classmethod
-    def unpacked(cls, theta: Array, kind: _Kind) -> "_Numbers":
-        """The numbers from one vector."""
-        free = kind.dof if kind.learned else 0
-        sizes = (free, free, free * kind.inputs, 1, kind.dof, len(kind.channels))
-        k, c, gain, memory, size, noise = jnp.split(theta, np.cumsum(sizes)[:-1].tolist())
-        return cls(k, c, gain.reshape(free, kind.inputs), memory[0], size, noise)
-
-    @property
-    def packed(self) -> np.ndarray:
-        return np.concatenate([np.ravel(q) for q in self])
-
-
 @dataclass(frozen=True)
 class _Part:
     """Degrees of freedom that are estimated together, in units of the motion's size `length` and rate `omega`.
 
     `places` are the degrees of freedom, `channels` those of the record that show them, `sizes` their units; `drive`
-    (n, inputs) enters the motion by the learned gains if `matrices` is None, else as the accelerations that it is;
-    `blur` is the covariance of its own white noise.
+    (n, inputs) are the measured forces in units of their size, and `rough` the standard deviations of their white
+    noise, known to a factor exp(`vague`). `gain` tells how they enter where that is not learned, `matrices` stiffness
+    and damping.
     """
 
     places: tuple[int, ...]
@@ -172,37 +140,31 @@ class _Part:
     dt: float
     seen: np.ndarray
     use: np.ndarray
+    spiky: np.ndarray
     sizes: np.ndarray
     noise: np.ndarray
     doubt: np.ndarray
     drive: np.ndarray
-    blur: np.ndarray
+    rough: np.ndarray
+    vague: np.ndarray
     base: np.ndarray
+    gain: np.ndarray
     matrices: tuple[np.ndarray, np.ndarray] | None
     at_rest: bool
 
     @classmethod
     def of_dof(cls, record: Record, place: int) -> "_Part":
-        force, variance = _forces(record, record.dofs)
-        acts = np.std(force, 0) > 0
-        size = np.std(force, 0)[acts]
-        return cls._of(record, (place,), force[:, acts] / size, np.diag(variance[acts] / size**2), None)
+        return cls._of(record, (place,), None, None)
 
     @classmethod
     def of_model(cls, record: Record, model: Structure) -> "_Part":
         plant = lower(model)
         minv = np.linalg.inv(np.asarray(plant.mass))
-        force, variance = _forces(record, model.dof)
-        return cls._of(
-            record,
-            tuple(range(1, model.dof + 1)),
-            force @ minv.T,
-            minv @ np.diag(variance) @ minv.T,
-            (minv @ np.asarray(plant.stiffness), minv @ np.asarray(plant.damping)),
-        )
+        matrices = (minv @ np.asarray(plant.stiffness), minv @ np.asarray(plant.damping))
+        return cls._of(record, tuple(range(1, model.dof + 1)), minv, matrices)
 
     @classmethod
-    def _of(cls, record: Record, places: tuple[int, ...], drive: np.ndarray, blur: np.ndarray, matrices) -> "_Part":
+    def _of(cls, record: Record, places: tuple[int, ...], minv: np.ndarray | None, matrices) -> "_Part":
         channels = tuple(c for c in record.responses if c[1] in places)
         n, dt = len(record), record.dt
         base = np.zeros(n) if record.base_acceleration is None else record.base_acceleration
@@ -218,84 +180,76 @@ class _Part:
         sizes = length * omega**orders
         least = _LEAST_NOISE * spread
         noise = np.array([max(floor.std, low) for floor, low in zip(floors, least, strict=True)])
-        use = np.column_stack([~(clipped(y) | spikes(y, s)) for y, s in zip(seen.T, noise, strict=True)])
+        spiky = np.column_stack([spikes(y, s) for y, s in zip(seen.T, noise, strict=True)])
+        use = np.column_stack([~clipped(y) for y in seen.T]) & ~spiky
         absolute = orders == 2  # an accelerometer shows the base's motion as well
-        unit = 1.0 if matrices is None else length * omega**2
+        force, rough, vague = _forces(record, record.dofs if minv is None else len(minv))
+        acts = np.std(force, 0) > 0
+        size = np.std(force, 0)[acts]
+        gain = np.zeros((len(places), len(size))) if minv is None else minv[:, acts] * size / (length * omega**2)
         doubt = np.array([0.2 if floor.spacing > _FINEST else 3.0 for floor in floors])
         return cls(
-            places, channels, omega, length, dt, (seen - base[:, None] * absolute) / sizes, use.astype(float), sizes,
-            noise / sizes, doubt, drive / unit, blur / unit**2, base / (length * omega**2), matrices, record.at_rest,
+            places, channels, omega, length, dt, (seen - base[:, None] * absolute) / sizes, use.astype(float), spiky,
+            sizes, noise / sizes, doubt, force[:, acts] / size, rough[acts] / size, vague[acts],
+            base / (length * omega**2), gain, matrices, record.at_rest,
         )  # fmt: skip
 
-    def kind(self, smooth: bool) -> _Kind:
+    def kind(self, smoothness: int) -> Kind:
         channels = tuple((_RESPONSES.index(kind), self.places.index(j)) for kind, j in self.channels)
-        return _Kind(channels, len(self.places), self.drive.shape[1], self.matrices is None, smooth)
+        return Kind(channels, len(self.places), self.drive.shape[1], self.matrices is None, smoothness)
 
-    def data(self, count: int) -> "_Data":
+    def data(self, count: int, swell: np.ndarray) -> Data:
         """The first `count` samples, padded to the length that programs are made for."""
         fill = ((0, bucket(count) - count), (0, 0))
         dof = len(self.places)
         k, c = (np.zeros((dof, dof)),) * 2 if self.matrices is None else self.matrices
-        return _Data(
-            *(jnp.asarray(np.pad(q[:count], fill)) for q in (self.seen, self.use, self.drive, self.base[:, None])),
-            blur=jnp.asarray(self.blur),
-            step=jnp.asarray(self.dt * self.omega),
-            first=jnp.asarray(_AT_REST if self.at_rest else _WIDE),
-            stiffness=jnp.asarray(k / self.omega**2),
-            damping=jnp.asarray(c / self.omega),
-        )
+        columns = (self.seen, self.use, self.drive, self.base[:, None], swell[:, None])
+        seen, use, drive, base, swell = (np.pad(q[:count], fill) for q in columns)
+        numbers = (
+            seen, use, drive, base, swell[:, 0], self.dt * self.omega, _AT_REST if self.at_rest else _WIDE,
+            k / self.omega**2, c / self.omega, self.gain,
+        )  # fmt: skip
+        return Data(*(jnp.asarray(q) for q in numbers))
 
     @property
-    def beliefs(self) -> tuple[_Numbers, _Numbers, _Numbers, _Numbers]:
+    def beliefs(self) -> tuple[Numbers, Numbers, Numbers, Numbers]:
         """Centre and width of what is believed beforehand, least and largest values.
 
         Little is, but of the noise, where the channel itself shows it.
         """
-        dof, channels = len(self.places), len(self.channels)
+        dof, channels, inputs = len(self.places), len(self.channels), self.drive.shape[1]
         free = dof if self.matrices is None else 0
-        shapes = ((free,), (free,), (free, self.drive.shape[1]), (), (dof,), (channels,))
+        shapes = ((free,), (free,), (free, inputs), (), (dof,), (inputs,), (dof,), (channels,))
 
         def all_of(*values):
-            return _Numbers(*(np.broadcast_to(value, shape) for value, shape in zip(values, shapes, strict=True)))
+            return Numbers(*(np.broadcast_to(value, shape) for value, shape in zip(values, shapes, strict=True)))
 
-        step, noise = float(np.log(self.dt * self.omega)), np.log(self.noise)
+        step, force, noise = float(np.log(self.dt * self.omega)), np.log(self.rough), np.log(self.noise)
         return (
-            all_of(0.0, -2.0, 0.0, 0.0, -1.0, noise),
-            all_of(2.0, 2.0, 3.0, 2.0, 3.0, self.doubt),
-            all_of(-6.0, -10.0, -30.0, step, -10.0, noise - 4.0),
-            all_of(4.0, 2.0, 30.0, 5.0, 4.0, noise + 4.0),
+            all_of(0.0, -2.0, 0.0, 0.0, -1.0, force, step - 7.0, noise),
+            all_of(2.0, 2.0, 3.0, 2.0, 3.0, self.vague, 3.0, self.doubt),
+            all_of(-6.0, -10.0, -30.0, step, -10.0, force - 7.0, step - 16.0, noise - 4.0),
+            all_of(4.0, 2.0, 30.0, 5.0, 4.0, force + 7.0, step, noise + 4.0),
         )
 
 
-class _Data(NamedTuple):
-    """Readings, which of them count, what drives, the base; noise of the drive, the step, and what is not learned."""
-
-    seen: Float[Array, "n channels"]
-    use: Float[Array, "n channels"]
-    drive: Float[Array, "n inputs"]
-    base: Float[Array, "n 1"]
-    blur: Float[Array, "inputs inputs"]
-    step: Float[Array, ""]
-    first: Float[Array, ""]
-    stiffness: Float[Array, "dof dof"]
-    damping: Float[Array, "dof dof"]
-
-
-def _forces(record: Record, dof: int) -> tuple[np.ndarray, np.ndarray]:
-    """Force samples (n, dof), smoothed where their noise shows above the signal's band, and the variance it leaves."""
-    variance = np.zeros(dof)
+def _forces(record: Record, dof: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Force samples (n, dof), smoothed where their noise shows above the signal's band; the standard deviation of the
+    noise that is left, and the doubt about its logarithm."""
+    rough, vague = np.ones(dof), np.ones(dof)
     if record.drive == "motion":
-        return np.zeros((len(record), dof)), variance
+        return np.zeros((len(record), dof)), rough, vague
     force = measured_force(record, dof)
     for j in range(dof):
         if np.any(force[:, j]):
             floor = noise_floor(force[:, j], record.dt)
             if floor.spacing >= _OVERSAMPLED:
                 force[:, j] = floor.smooth
-                variance[j] = floor.std**2 * floor.effective_parameters / len(record)
+                rough[j], vague[j] = floor.std * np.sqrt(floor.effective_parameters / len(record)), 1.0
             else:
-                variance[j] = min(floor.std, _FULL_BAND * np.std(force[:, j])) ** 2
-    return force, variance
+                rough[j], vague[j] = min(floor.std, _FULL_BAND * np.std(force[:, j])), 3.0
+            rough[j] = max(rough[j], _LEAST_NOISE * np.std(force[:, j]))
+    return force, rough, vague
 
 
 def _together(record: Record, parts: list[_Part], dof: int) -> Motion:
@@ -321,121 +275,83 @@ def _together(record: Record, parts: list[_Part], dof: int) -> Motion:
 
 def _estimate(part: _Part) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Mean and covariance of (x, v, a) of every degree of freedom, biases and noise levels, in units of the motion."""
-    n = len(part.seen)
-    head = part.data(min(n, _LEARNED))
+    n, dof = len(part.seen), len(part.places)
+    begin, even = part.beliefs[0].packed, np.ones(n)
+    best = _learned(part, part.kind(0), begin, even)
+    for smoothness in _SMOOTHER:
+        other = _learned(part, part.kind(smoothness), begin, even)
+        if other.cost > best.cost:
+            break
+        best, begin = other, other.theta
+    best = _swollen(part, best)
+    mean, covariance = _smoothed(part, best)
+    if np.any(part.spiky):
+        part = _believing(part, best, mean, covariance)
+        mean, covariance = _smoothed(part, best)
+    count, biased = 3 * dof, best.kind.biased
+    bias = np.zeros(len(part.channels))
+    bias[list(biased)] = mean[0, count : count + len(biased)]
+    noise = np.exp(Numbers.unpacked(jnp.asarray(best.theta), best.kind).noise)
+    return mean[:, :count], covariance[:, :count, :count], bias, noise
+
+
+@dataclass(frozen=True)
+class _Learned:
+    """Most probable numbers of one kind of model, and how improbable they make the record."""
+
+    cost: float
+    kind: Kind
+    theta: np.ndarray
+    swell: np.ndarray
+
+
+def _learned(part: _Part, kind: Kind, begin: np.ndarray, swell: np.ndarray, price: float = 0.0) -> _Learned:
     centre, width, low, high = (numbers.packed for numbers in part.beliefs)
-    found = []
-    for smooth in (False, True):
-        kind = part.kind(smooth)
+    head = part.data(min(len(part.seen), _LEARNED), swell)
 
-        def cost(theta, kind=kind):
-            value, slope = _cost(jnp.asarray(theta), head, jnp.asarray(centre), jnp.asarray(width), kind=kind)
-            return float(value), np.asarray(slope)
+    def cost_of(theta):
+        value, slope = cost(jnp.asarray(theta), head, jnp.asarray(centre), jnp.asarray(width), kind=kind)
+        if not np.isfinite(value):  # numbers that the filter cannot run with; the search turns back
+            return _NO_VALUE, np.zeros(theta.size)
+        return float(value), np.asarray(slope)
 
-        bounds = list(zip(low, high, strict=True))
-        best = minimize(cost, np.clip(centre, low, high), jac=True, method="L-BFGS-B", bounds=bounds, options=_SEARCH)
-        found.append((best.fun, kind, best.x))
-    _, kind, theta = min(found, key=lambda item: item[0])
-    mean, covariance = (np.asarray(q)[:n] for q in _motion(jnp.asarray(theta), part.data(n), kind=kind))
-    count = 3 * kind.dof
-    noise = np.exp(_Numbers.unpacked(jnp.asarray(theta), kind).noise)
-    return mean[:, :count], covariance[:, :count, :count], mean[0, count:], noise
+    bounds = list(zip(low, high, strict=True))
+    best = minimize(cost_of, np.clip(begin, low, high), jac=True, method="L-BFGS-B", bounds=bounds, options=_SEARCH)
+    return _Learned(float(best.fun) + price, kind, best.x, swell)
 
 
-class _Built(NamedTuple):
-    """A linear model; how a driving acceleration, its slope and its bend enter it; rows of (x, v, a) and of biases."""
-
-    linear: LinearModel
-    enter: Float[Array, "state three_dof"]
-    watch: Float[Array, "watched state"]
+def _smoothed(part: _Part, found: _Learned) -> tuple[np.ndarray, np.ndarray]:
+    n = len(part.seen)
+    mean, covariance = motion(jnp.asarray(found.theta), part.data(n, found.swell), kind=found.kind)
+    return np.asarray(mean)[:n], np.asarray(covariance)[:n]
 
 
-def _built(numbers: _Numbers, blur, data: _Data, kind: _Kind) -> _Built:
-    dof, dt, eye = kind.dof, data.step, jnp.eye(kind.dof)
-    k, c = data.stiffness, data.damping
-    if kind.learned:
-        k, c = jnp.diag(jnp.exp(numbers.stiffness)), jnp.diag(jnp.exp(numbers.damping))
-    size, tau = jnp.exp(numbers.size), jnp.exp(numbers.memory)
-    if kind.smooth:  # Matérn 3/2: the random force and its rate
-        rate = jnp.sqrt(3.0) / tau
-        memory = jnp.block([[0 * eye, eye], [-(rate**2) * eye, -2 * rate * eye]])
-        density = jnp.concatenate([0 * size, 4 * rate**3 * size**2])
-        stationary = jnp.concatenate([size**2, (rate * size) ** 2])
-    else:  # Matérn 1/2: Ornstein and Uhlenbeck's
-        memory, density, stationary = -eye / tau, 2 * size**2 / tau, size**2
-    extra = density.size
-    n = 2 * dof + extra
-    a = jnp.zeros((n, n)).at[:dof, dof : 2 * dof].set(eye).at[2 * dof :, 2 * dof :].set(memory)
-    a = a.at[dof : 2 * dof].set(jnp.concatenate([-k, -c, -eye, jnp.zeros((dof, extra - dof))], 1))
-    # C. F. Van Loan, IEEE Trans. Autom. Control 23 (1978) 395-404: the covariance that a step adds.
-    spread = jnp.diag(jnp.concatenate([jnp.zeros(2 * dof), density]))
-    loan = jax.scipy.linalg.expm(dt * jnp.block([[-a, spread], [jnp.zeros((n, n)), a.T]]))
-    step = loan[n:, n:].T
-    added = step @ loan[:n, n:]
-    # The drive is a parabola between samples: x' = a x + enter u, with u, u' and u'' at the start of the step.
-    held = jnp.zeros((n + 3 * dof, n + 3 * dof)).at[:n, :n].set(dt * a)
-    held = held.at[dof : 2 * dof, n : n + dof].set(dt * eye)
-    held = held.at[n : n + dof, n + dof : n + 2 * dof].set(eye).at[n + dof : n + 2 * dof, n + 2 * dof :].set(eye)
-    enter = jax.scipy.linalg.expm(held)[:n, n:]
-    shown = jnp.stack([jnp.eye(n)[:dof], jnp.eye(n)[dof : 2 * dof], a[dof : 2 * dof]])
-    rows = jnp.stack([shown[order, j] for order, j in kind.channels])
-    channels = len(kind.channels)
-    biased = jnp.diag(jnp.array([float(order > 0) for order, _ in kind.channels]))
-    start = jnp.concatenate([jnp.full(2 * dof, data.first**2), stationary, jnp.full(channels, _BIAS**2)])
-    fill = (0, channels)
-    linear = LinearModel(
-        step=jnp.eye(n + channels).at[:n, :n].set(step),
-        noise=jnp.pad((added + added.T) / 2, (fill, fill)).at[dof : 2 * dof, dof : 2 * dof].add(dt**2 * blur),
-        rows=jnp.concatenate([rows, biased], 1),
-        variance=jnp.exp(2 * numbers.noise) + jnp.stack([blur[j, j] * (order == 2) for order, j in kind.channels]),
-        start=jnp.diag(start),
-    )
-    watch = jnp.zeros((3 * dof + channels, n + channels)).at[3 * dof :, n:].set(biased)
-    watch = watch.at[: 3 * dof, :n].set(shown.transpose(1, 0, 2).reshape(3 * dof, n))
-    return _Built(linear, jnp.pad(enter, (fill, (0, 0))), watch)
+def _believing(part: _Part, found: _Learned, mean: np.ndarray, covariance: np.ndarray) -> _Part:
+    """The part with those spikes counted that may be motion, as the kicks of dry friction are."""
+    use = part.use.copy()
+    noise = np.exp(Numbers.unpacked(jnp.asarray(found.theta), found.kind).noise)
+    for i, (order, j) in enumerate(found.kind.channels):
+        place = 3 * j + order
+        expected = mean[:, place]
+        if i in found.kind.biased:
+            expected = expected + mean[:, 3 * found.kind.dof + found.kind.biased.index(i)]
+        strange = np.abs(part.seen[:, i] - expected) > _STRANGE * np.sqrt(covariance[:, place, place] + noise[i] ** 2)
+        use[part.spiky[:, i] & ~strange, i] = 1.0
+    return replace(part, use=use)
 
 
-class _Driven(NamedTuple):
-    """What is built; the acceleration that drives and its noise; what it adds over every step; readings without it."""
-
-    built: _Built
-    push: Float[Array, "n dof"]
-    blur: Float[Array, "dof dof"]
-    pushed: Float[Array, "n state"]
-    seen: Float[Array, "n channels"]
-
-
-def _driven(theta: Array, data: _Data, kind: _Kind) -> _Driven:
-    numbers = _Numbers.unpacked(theta, kind)
-    push, blur = data.drive, data.blur
-    if kind.learned:
-        push, blur = push @ numbers.gain.T, numbers.gain @ blur @ numbers.gain.T
-    push = push - data.base
-    built = _built(numbers, blur, data, kind)
-    after = jnp.concatenate([push[1:], push[-1:]])
-    bend = jnp.concatenate([push[:1], push[:-1]]) - 2 * push + after
-    bend = (bend + jnp.concatenate([bend[1:], bend[-1:]])) / 2
-    pushed = jnp.concatenate([push, after - push - bend / 2, bend], 1) @ built.enter.T
-    at_once = jnp.stack([push[:, j] * (order == 2) for order, j in kind.channels], 1)
-    return _Driven(built, push, blur, pushed, data.seen - at_once)
-
-
-@partial(jax.jit, static_argnames="kind")
-def _cost(theta: Array, data: _Data, centre: Array, width: Array, *, kind: _Kind):
-    """Minus log-posterior of the numbers, and its slope."""
-
-    def cost(theta):
-        d = _driven(theta, data, kind)
-        likelihood = log_likelihood(d.built.linear, d.pushed, d.seen, data.use)
-        return 0.5 * jnp.sum(((theta - centre) / width) ** 2) - likelihood
-
-    return jax.value_and_grad(cost)(theta)
-
-
-@partial(jax.jit, static_argnames="kind")
-def _motion(theta: Array, data: _Data, *, kind: _Kind):
-    """Mean and covariance of (x, v, a) of every degree of freedom, and then of the biases."""
-    d = _driven(theta, data, kind)
-    mean, covariance = smoothed(d.built.linear, d.pushed, d.seen, data.use, d.built.watch)
-    own = slice(2, 3 * kind.dof, 3)
-    return mean.at[:, own].add(d.push), covariance.at[:, own, own].add(d.blur)
+def _swollen(part: _Part, found: _Learned) -> _Learned:
+    """The same with a random force that swells and fades as the one found does, if that is more probable."""
+    n, dof = len(part.seen), found.kind.dof
+    mean, covariance = _smoothed(part, found)
+    size = np.exp(Numbers.unpacked(jnp.asarray(found.theta), found.kind).size)
+    spread = np.diagonal(covariance[:, -dof:, -dof:], axis1=1, axis2=2)
+    power = np.mean((mean[:, -dof:] ** 2 + spread) / size**2, 1)
+    best = found
+    for cycles in _CYCLES:
+        window = cycles * 2 * np.pi / (part.omega * part.dt)
+        local = gaussian_filter1d(power, window, mode="nearest")
+        swell = np.maximum(local / np.mean(local), _LEAST_SWELL)
+        # What is free to swell fits better by chance: half a nat for every window.
+        best = min(best, _learned(part, found.kind, found.theta, swell, 0.5 * n / window), key=lambda each: each.cost)
+    return best

@@ -87,6 +87,11 @@ def starts(structure: Structure, nuisances: Nuisances, most: int = 3, rounds: in
     return [_with(structure, {id(law): best[i] for i, law in enumerate(laws) if i in best})]
 
 
+def with_law(structure: Structure, law: AbstractTerm, numbers: Mapping[str, float]) -> Structure:
+    """The structure with one of its laws at other numbers."""
+    return _with(structure, {id(law): type(law)(**numbers, at=law.at)})
+
+
 def _with(structure: Structure, instead: Mapping[int, AbstractTerm]) -> Structure:
     """The structure with some of its terms, by identity, replaced."""
     terms = [instead.get(id(term), term) for term in structure.terms]
