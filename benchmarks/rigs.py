@@ -84,12 +84,13 @@ def segments(model: jfsm.Structure, record: jfsm.Record, length: int) -> float:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description="Values and free runs of two standards whose model is known.")
-    parser.add_argument("rigs", nargs="*", default=["bouc_wen", "emps"], choices=["bouc_wen", "emps"])
+    parser.add_argument("rigs", nargs="*", default="all", choices=["all", "bouc_wen", "emps"])
     default = Path(os.environ.get("JFSM_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
     parser.add_argument("--data", type=Path, default=default)
     given = parser.parse_args()
-    for name in given.rigs:
-        {"bouc_wen": bouc_wen, "emps": emps}[name](given.data)
+    every = {"bouc_wen": bouc_wen, "emps": emps}
+    for name in every if "all" in given.rigs else given.rigs:
+        every[name](given.data)
 
 
 if __name__ == "__main__":

@@ -22,6 +22,8 @@ from .estimation import estimate_motion as estimate_motion
 from .identification import Fit as Fit
 from .identification import fit as fit
 from .records import Record as Record
+from .records import align as align
+from .records import join as join
 from .records import read as read
 from .structures import AccelerationBias as AccelerationBias
 from .structures import AccelerationGain as AccelerationGain

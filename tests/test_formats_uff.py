@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import pyuff
 
-from jfsm.records import Record, read
+from jfsm.records import Record, align, read
 
 N = 100
 T = 0.5 + np.arange(N) * 0.02
@@ -131,10 +131,13 @@ def test_channels_of_different_clocks_are_refused_by_name(tmp_path):
     message = (
         r"a\.uff must have channels of one clock .*'3:\+Z' has 50 samples from 0.5 to 2.46 s, '1:\+Z' has 100 .*2.48 s"
     )
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match=message + r".*bring these to one clock by jfsm\.align\(records\)"):
         read(path, displacement=["1:+Z", "2:+Z"], force="3:+Z")
-    assert len(read(path, displacement=["1:+Z", "2:+Z"])) == 100
-    assert len(read(path, force="3:+Z")) == 50
+    fast, slow = read(path, displacement=["1:+Z", "2:+Z"]), read(path, force="3:+Z")
+    assert (len(fast), len(slow)) == (100, 50)
+    together = align([fast, slow])
+    assert (together.sample_rate, together.time[0]) == (pytest.approx(fast.sample_rate), 0.5)
+    np.testing.assert_allclose(together.channels["force", 1][::2], U[:50][: len(together.time[::2])], atol=1e-3)
 
 
 def test_a_file_without_time_responses_says_what_it_holds(tmp_path):

@@ -1,5 +1,7 @@
 """What one channel, or the drive and a response, show: level, repeats, coherence, noise over frequency."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,9 @@ from jfsm.records._repeats import copies, longest_hold, repetition
 DT, N = 0.01, 3000
 T = DT * np.arange(N)
 WAVE = np.sin(6.0 * T) + 0.5 * np.sin(11.0 * T)
+TURNS = np.linspace(1.0, 0.1, 26) * (-1.0) ** np.arange(26)
+SWING = np.concatenate([0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, 100))), np.ones(20)])
+STICKING = np.concatenate([a + (b - a) * SWING for a, b in pairwise(TURNS)])  # a joint that rests where it turns
 
 
 def white(seed, std=0.01, n=N):
@@ -63,6 +68,10 @@ def test_a_sensor_that_hung_is_warned_of():
         np.clip(WAVE + white(4), -1.0, 1.0),
         np.repeat(WAVE[::8] + white(4)[::8], 8),
         np.sign(WAVE),
+        np.repeat(white(5)[:600], 5),
+        np.repeat(white(5)[:300], np.tile([5, 10, 15], 100))[: T.size],
+        STICKING,
+        np.gradient(STICKING, T),
     ],
 )
 def test_rest_clipping_steps_and_slow_samples_are_no_hang(y):
@@ -153,3 +162,34 @@ def test_spikes_where_the_velocity_turns_are_put_down_to_friction(at, severity):
     acceleration[(100 if at == "turning" else 125) * np.arange(2, 8)] -= 60.0
     found = messages(severity, "acceleration 1", displacement=x + white(17, 1e-3), acceleration=acceleration)
     assert any("6 of 3000 samples are spikes" in words for words in found)
+
+
+def test_noise_of_a_signal_at_the_band_limit_is_called_an_upper_bound_and_no_fault():
+    lines = np.arange(1, 650)
+    fast = np.cos(np.outer(np.arange(N), lines * np.pi / 1000) + lines**2).sum(axis=1)
+    found = messages("info", "force 1", force=fast, displacement=WAVE + white(1))
+    assert any(words.startswith("Noise of at most") for words in found)
+    warned = messages("warning", "force 1", force=fast, displacement=WAVE + white(1))
+    assert any("reaches the band limit" in words for words in warned)
+    assert not any("Noise of" in words for words in warned)
+
+
+def test_motion_slower_than_two_periods_has_no_frequency():
+    slow = np.cos(np.pi * T / T[-1]) + white(6)
+    assert any(
+        "below two periods in the record: its frequency" in words for words in messages("info", displacement=slow)
+    )
+
+
+def test_a_drive_in_steps_has_neither_noise_nor_a_spectrum_of_it():
+    steps = np.repeat(white(5)[:300], np.tile([5, 10, 15], 100))[:N]
+    page = Record(T, force=steps, displacement=WAVE + white(1)).inspect()
+    assert page.channels[0].noise == 0.0
+    assert "force 1" not in [one.channel for one in page.noise]
+
+
+def test_a_decay_after_a_blow_is_not_called_narrow_in_amplitude_and_a_steady_motion_is():
+    blow = np.exp(-T / 0.05) * np.cos(150.0 * T)  # far faster and larger than what goes on ringing
+    ringing = np.exp(-T / 10.0) * np.cos(12.0 * T)
+    assert not any("Amplitude stays" in words for words in messages("info", displacement=ringing + 5.0 * blow))
+    assert any("Amplitude stays within" in words for words in messages("info", displacement=np.cos(12.0 * T)))

@@ -224,8 +224,9 @@ def test_text_is_read_in_blocks(tmp_path, monkeypatch):
     np.testing.assert_array_equal(read(tmp_path / "b.csv").channels["force", 1], U)
 
 
-def test_a_long_text_takes_a_few_times_the_memory_of_its_numbers(tmp_path):
+def test_a_long_text_takes_twice_the_memory_of_its_numbers(tmp_path, monkeypatch):
     n = 200_000
+    monkeypatch.setattr(text, "BLOCK", 1000)
     with (tmp_path / "a.csv").open("w") as stream:
         stream.write("time,u\n")
         stream.writelines(f"{0.001 * i:.3f},{i % 97}\n" for i in range(n))
@@ -234,7 +235,7 @@ def test_a_long_text_takes_a_few_times_the_memory_of_its_numbers(tmp_path):
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert len(record) == n
-    assert peak < 5 * (2 * 8 * n)  # columns, their copies in the record and one block of text; all text would take 20
+    assert peak < 2.5 * (2 * 8 * n)  # the table and the record, and one block of text; all text would take 20
 
 
 def test_columns_of_one_name_stay_apart(tmp_path):
@@ -250,12 +251,66 @@ def test_columns_of_one_name_stay_apart(tmp_path):
         ("", r"a\.csv must hold columns of numbers; its middle line is ''"),
         ("PK\x03\x04\x00\x01", r"a\.csv must hold columns of numbers; its middle line is 'PK.*Export numbers"),
         ("time,u\n0,1\n1,2\n2,#N/A\n3,3\n", r"a\.csv must hold numbers in column 'u'; line 4 holds '#N/A'\. Repair"),
+        ("time,u\n0,1\n1,2\n2,nan\n3,3\n", r"`force dof 1` must be finite; 1 of 4.*is sample 2"),
+        ("time,u\n", r"a\.csv must hold columns of numbers; its middle line is 'time,u'"),
+        ("time,u\n0,1\n", r"a\.csv must say when its samples were taken; it holds 'time', 'u'"),
+        ("time,u\ns,N\n0,1\n1,2\n2,3,4\n", r"a\.csv must have 2 columns in every row of data; line 5 has 3"),
     ],
 )
-def test_text_that_is_no_table_is_refused(tmp_path, text, message):
+def test_text_that_is_no_table_is_refused_and_left_as_it_was(tmp_path, text, message):
     (tmp_path / "a.csv").write_text(text)
     with pytest.raises(ValueError, match=message):
         read(tmp_path / "a.csv", force="u")
+    assert (tmp_path / "a.csv").read_text() == text
+
+
+def test_units_that_differ_within_a_kind_are_refused_by_channel(tmp_path):
+    (tmp_path / "a.csv").write_text("time,y1,y2\ns,mm,m\n0,1,1\n1,2,2\n2,3,3\n")
+    with pytest.raises(ValueError, match=r"`units` must be the same .* are \{'y1': 'mm', 'y2': 'm'\} in a\.csv\. Conv"):
+        read(tmp_path / "a.csv", displacement=["y1", "y2"])
+
+
+LONG = "specimen,run,time,u\n" + "".join(
+    f"{specimen},{run},{i},{i + 10 * run + (100 if specimen == 'B 2' else 0)}\n"
+    for specimen in ("A", "B 2")
+    for run in (1, 2)
+    for i in range(6)
+)
+
+
+def test_one_run_of_a_long_table_is_read_by_the_values_of_its_columns(tmp_path):
+    (tmp_path / "a.csv").write_text(LONG)
+    record = read(tmp_path / "a.csv", force="u", where={"specimen": "B 2", "run": 2})
+    np.testing.assert_array_equal(record.time, np.arange(6))
+    np.testing.assert_array_equal(record.channels["force", 1], 120 + np.arange(6))
+    assert record.notes == ("Rows with specimen = B 2 and run = 2: 6 of 24.",)
+
+
+def test_rows_of_columns_in_a_binary_file_are_chosen_alike(tmp_path):
+    run = np.repeat([1, 2], 50)
+    path = _save(tmp_path / "a.npz", run=run, t=np.tile(T[:50], 2), u=U, both=np.stack([Y, U]), fs=50.0)
+    record = read(path, force="u", displacement="both", where={"run": 2})
+    np.testing.assert_array_equal(record.time, T[:50])
+    np.testing.assert_array_equal(record.displacement, np.stack([Y, U], 1)[50:])
+    with pytest.raises(ValueError, match=r"`where` must name columns of one length; 'fs' in a\.npz has shape \(\)"):
+        read(path, force="u", where={"fs": 50.0})
+
+
+@pytest.mark.parametrize(
+    ("where", "message"),
+    [
+        (
+            {"specimen": "C"},
+            r"`where` must leave rows of a\.csv; none has specimen = C\. 'specimen' holds 'A', 'B 2'\. A",
+        ),
+        ({"specimen": "A", "run": 3}, r"none has specimen = A and run = 3\. 'run' holds 1\.0, 2\.0"),
+        ({"probe": "A"}, r"`where` must name a channel of a\.csv, which holds 'specimen', 'run'.*it was 'probe'"),
+    ],
+)
+def test_rows_that_do_not_exist_are_refused_with_what_there_is(tmp_path, where, message):
+    (tmp_path / "a.csv").write_text(LONG)
+    with pytest.raises(ValueError, match=message):
+        read(tmp_path / "a.csv", force="u", where=where)
 
 
 @pytest.mark.parametrize(

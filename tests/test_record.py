@@ -158,6 +158,30 @@ def test_until_keeps_the_sample_at_that_instant():
     assert Record(T).until(1e9).time[-1] == T[-1]
 
 
+def test_since_begins_with_the_sample_at_that_instant():
+    assert Record(T).since(T[100]).time[0] == T[100]
+    assert Record(T).since(-1.0).time[0] == T[0]
+    assert not Record(T, at_rest=True).since(T[1]).at_rest
+
+
+def test_what_is_cut_off_is_noted():
+    record = Record(T, displacement=X)
+    assert record[50:150].notes == ("Samples 50 to 149 of 200 are kept, t = 0.5 to 1.49 s.",)
+    assert record.until(1.0).notes == ("Samples 0 to 100 of 200 are kept, t = 0 to 1 s.",)
+    assert record.since(1.0).notes == ("Samples 100 to 199 of 200 are kept, t = 1 to 1.99 s.",)
+    assert record[:].notes == record.until(9.0).notes == ()
+
+
+def test_a_clock_is_shifted_and_says_so():
+    record = Record(T, displacement=X, at_rest=True).shifted(-0.25)
+    np.testing.assert_array_equal(record.time, T - 0.25)
+    np.testing.assert_array_equal(record.channels["displacement", 1], X)
+    assert (record.at_rest, record.notes) == (True, ("The clock was put back by 0.25 s.",))
+    assert not record.time.flags.writeable
+    with pytest.raises(ValueError, match="`seconds` must be a finite time; it was inf"):
+        record.shifted(np.inf)
+
+
 def test_slices_that_are_no_records_are_refused():
     record = Record(T, displacement=X)
     with pytest.raises(TypeError, match=r"A record is sliced, record\[a:b\]; the index was 3"):
@@ -220,6 +244,12 @@ def test_resampling_makes_uneven_time_even_whatever_the_spacing():
     assert np.max(np.abs(record.displacement[:, 0] - _signal(record.time))) < 6e-3
     assert record.sample_rate == pytest.approx(50.0)
     assert "by cubic interpolation of uneven samples" in record.notes[-1]
+
+
+def test_a_gap_that_was_bridged_is_noted_even_where_the_rate_stays():
+    t = np.delete(np.arange(400) * 0.01, slice(200, 203))
+    other = Record(t, displacement=_signal(t)).resample(100.0)
+    assert other.notes[-1].endswith("by cubic interpolation of uneven samples with gaps of up to 0.04 s.")
 
 
 def test_resampling_sees_through_time_stamps_that_were_rounded():

@@ -1,5 +1,7 @@
 """What was measured: records, their files, their units and their noise."""
 
+from jfsm.records._combine import align as align
+from jfsm.records._combine import join as join
 from jfsm.records._declip import declipped as declipped
 from jfsm.records._defects import clipped as clipped
 from jfsm.records._defects import spikes as spikes

@@ -19,7 +19,8 @@ def as_time(time: Any, factor: float) -> NDArray[np.float64]:
     ValueError
         If it is not one column of at least two finite numbers, or does not increase.
     """
-    clock = _real("time", time) * factor
+    clock = _real("time", time)
+    clock *= factor
     if clock.ndim != 1 or clock.size < 2:
         raise ValueError(
             f"`time` must be one column of at least 2 samples; it has shape {clock.shape}. "
@@ -57,8 +58,9 @@ def as_columns(kind: str, given: Any, time: NDArray[np.float64], factor: float) 
             if dof < 1:
                 raise ValueError(f"`{kind}` given by dof counts from 1 (0 is ground); one key is {dof}. Number from 1.")
         dofs = tuple(sorted(int(dof) for dof in given))
-        columns = [_column(kind, given[dof], time) for dof in dofs]
-        samples = np.stack(columns, axis=1) if columns else np.empty((time.size, 0))
+        samples = np.empty((time.size, len(dofs)), order="F")
+        for place, dof in enumerate(dofs):
+            samples[:, place] = _column(kind, given[dof], time)
     else:
         samples = _real(kind, given)
         if samples.ndim == 1:
@@ -70,14 +72,16 @@ def as_columns(kind: str, given: Any, time: NDArray[np.float64], factor: float) 
         raise ValueError(f"`{kind}` must hold at least one channel; it is empty. Leave an unmeasured kind out.")
     for dof, column in zip(dofs, samples.T, strict=True):
         _require_finite(f"{kind} dof {dof}", column, time)
-    return dofs, frozen(np.asfortranarray(samples * factor))
+    samples *= factor
+    return dofs, frozen(np.asfortranarray(samples))
 
 
 def as_single(kind: str, given: Any, time: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
     """The samples of a quantity that exists once, (n,) in the coherent unit; errors as `as_columns`."""
     samples = _column(kind, given, time)
     _require_finite(kind, samples, time)
-    return frozen(samples * factor)
+    samples *= factor
+    return frozen(samples)
 
 
 def frozen(array: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -21,9 +21,11 @@ LEVEL_ERRORS = 4.0  # standard errors that offset and drift must have besides
 NOISY_SHARE = 0.1
 COARSE_SHARE = 0.1  # of the standard deviation: a quantisation step that shapes the signal
 FEW_PER_PERIOD = 8.0
+FEWEST_PERIODS = 1.5  # between the first line of the spectrum, which any slow motion fills, and the second
 MOSTLY = 0.8  # share of the spikes that friction must account for
 FAST, FAST_SHARE = 0.125, 0.1  # of the sampling rate; of the power, above which a signal is near the band limit
 BANDS, NARROW = 10, 4  # bands of amplitude, and how few of them leave laws of amplitude indistinguishable
+STEADY = 2.0  # times the motion of another quarter of the record, below which the amplitude is one level
 VISITED = 0.01  # share of samples that makes a band visited
 
 
@@ -129,7 +131,7 @@ def examine(
         *_of_spikes(summary, torn, turning),
         *_of_level(summary),
         *_of_noise(summary, floor),
-        *_of_motion(summary, uniform.size * dt, dt),
+        *_of_motion(summary, uniform, dt),
     ]
     return summary, found
 
@@ -232,30 +234,45 @@ def _of_noise(summary: ChannelSummary, floor: NoiseFloor | None) -> Iterator[Fin
         yield Finding("info", channel, f"Noise only, {floor.std:.3g} {unit}, or too fast to be told from it.")
         return
     share = floor.std / summary.std
-    severity = "warning" if share > NOISY_SHARE else "info"
-    message = f"Noise of {floor.std:.3g} ± {floor.std_error:.1g} {unit}, {share:.2%} of the standard deviation."
-    yield Finding(severity, channel, message)
+    at_limit = floor.spacing == SPACINGS[0] and fast_share(floor.smooth) > FAST_SHARE
+    severity = "warning" if share > NOISY_SHARE and not at_limit else "info"
+    size = f"{'at most ' if at_limit else ''}{floor.std:.3g} ± {floor.std_error:.1g} {unit}"
+    yield Finding(severity, channel, f"Noise of {size}, {share:.2%} of the standard deviation.")
     if floor.spacing == SPACINGS[0]:
-        if fast_share(floor.smooth) > FAST_SHARE:
+        if at_limit:
             message = "The signal reaches the band limit: the noise may be partly signal. Sample faster if you can."
             yield Finding("warning", channel, message)
         else:
             yield Finding("info", channel, "Bends or jumps between samples, which the noise level leaves out.")
 
 
-def _of_motion(summary: ChannelSummary, duration: float, dt: float) -> Iterator[Finding]:
+def _of_motion(summary: ChannelSummary, uniform: Samples, dt: float) -> Iterator[Finding]:
     if summary.frequency is None or summary.coverage is None:
         return
-    channel, periods, per_period = summary.channel, summary.frequency * duration, 1.0 / (summary.frequency * dt)
+    channel, per_period = summary.channel, 1.0 / (summary.frequency * dt)
+    periods = uniform.size / per_period
     severity = "warning" if per_period < FEW_PER_PERIOD else "info"
-    yield Finding(
-        severity,
-        channel,
-        f"Strongest at {summary.frequency:.4g} Hz: {periods:.3g} periods of {per_period:.3g} samples.",
-    )
-    if round(summary.coverage * BANDS) <= NARROW and channel.split()[0] != "force":
+    if periods < FEWEST_PERIODS:
+        message = "Strongest below two periods in the record: its frequency cannot be told."
+    else:
+        counts = f"{_figure(periods)} periods of {_figure(per_period)} samples"
+        message = f"Strongest at {summary.frequency:.4g} Hz: {counts}."
+    yield Finding(severity, channel, message)
+    narrow = round(summary.coverage * BANDS) <= NARROW and _is_steady(uniform)
+    if narrow and channel.split()[0] != "force":
         message = (
             f"Amplitude stays within {round(summary.coverage * BANDS)} of {BANDS} bands: laws that differ in how they "
             f"grow with amplitude will look alike. Add a record at another level."
         )
         yield Finding("info", channel, message)
+
+
+def _is_steady(y: Samples) -> bool:
+    """Whether no quarter moves far more than another, as where a motion dies out, however short its first blow."""
+    sizes = [float(quarter.std()) for quarter in np.array_split(y, 4)]
+    return max(sizes) < STEADY * min(sizes)
+
+
+def _figure(count: float) -> str:
+    """Three digits, and all that stand before the point."""
+    return f"{count:.0f}" if count >= 100 else f"{count:.3g}"

@@ -115,7 +115,8 @@ def inspect(record: "Record") -> Inspection:
         if floor is None or np.ptp(y) == 0:
             continue
         readings[channel] = Reading(channel, y, floor.std, clipped(y) | spikes(y, floor.std))
-        spectra.append(noise_spectrum(channel, y, floor))
+        if floor.std > 0:
+            spectra.append(noise_spectrum(channel, y, floor))
     noise = tuple(spectrum for spectrum in spectra if spectrum is not None)
     findings.extend(_of_spectra(noise, summaries))
     findings.extend(_of_copies(readings))

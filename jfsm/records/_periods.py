@@ -1,6 +1,6 @@
 """A record that repeats itself: noise by averaging, and distortion where the excitation leaves room to see it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -98,6 +98,34 @@ def period_of(y: Samples) -> int | None:
     return length if strength.max() < EVEN * strength.min() else None  # not the decay of a ringing
 
 
+def common_period(drives: Iterable[Samples]) -> int | None:
+    """Samples after which all driving channels repeat themselves, None if they do not or there are none."""
+    lengths = {period_of(drive) for drive in drives}
+    return lengths.pop() if len(lengths) == 1 else None
+
+
+def whole_periods(y: Samples, length: int) -> NDArray[np.float64]:
+    """The last whole periods of a channel, (count, length)."""
+    return y[y.size % length :].reshape(-1, length)
+
+
+def change(periods: NDArray[np.float64]) -> float:
+    """Standard deviation of what changes from period to period (count, length), apart from their offset."""
+    count = len(periods)
+    off = periods - periods.mean(axis=1, keepdims=True)
+    return float(np.sqrt(np.mean(np.var(off - off.mean(axis=0), axis=0) * count / (count - 1))))
+
+
+def unsettled(periods: NDArray[np.float64]) -> int:
+    """How many of the first periods (count, length) differ more from the last one than later ones do; two are kept."""
+    if len(periods) < 3:
+        return 0
+    apart = np.sqrt(np.mean((periods[:-1] - periods[-1]) ** 2, axis=1))
+    usual = float(np.median(apart[len(apart) // 2 :]))
+    settled = np.flatnonzero(apart <= SETTLED * usual)
+    return int(min(settled[0], len(periods) - 2))
+
+
 def average(drives: Mapping[str, Samples], responses: Mapping[str, Samples], dt: float) -> Periods | None:
     """Mean period, noise and distortion of every channel; None if the driving channels do not repeat themselves.
 
@@ -118,14 +146,13 @@ def average(drives: Mapping[str, Samples], responses: Mapping[str, Samples], dt:
     .. [1] R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach, 2nd edition, Wiley-IEEE Press,
        2012, chapter 4.
     """
-    lengths = [period_of(drive) for drive in drives.values()]
-    if not lengths or None in lengths or len(set(lengths)) > 1:
+    length = common_period(drives.values())
+    if length is None:
         return None
-    length = lengths[0] or 0
     every = {**drives, **responses}
     n = next(iter(every.values())).size
-    folded = {name: y[n - n // length * length :].reshape(-1, length) for name, y in every.items()}
-    transient = max((_unsettled(periods) for periods in folded.values()), default=0)
+    folded = {name: whole_periods(y, length) for name, y in every.items()}
+    transient = max((unsettled(periods) for periods in folded.values()), default=0)
     folded = {name: periods[transient:] for name, periods in folded.items()}
     count = n // length - transient
     lines = {name: _lines(periods) for name, periods in folded.items()}
@@ -138,24 +165,13 @@ def average(drives: Mapping[str, Samples], responses: Mapping[str, Samples], dt:
     channels = []
     for name, periods in folded.items():
         mean, error = lines[name]
-        off = periods - periods.mean(axis=1, keepdims=True)
-        noise = float(np.sqrt(np.mean(np.var(off - off.mean(axis=0), axis=0) * count / (count - 1))))
+        noise = change(periods)
         free = {"even": None, "odd": None}
         if drive is not None and name in responses:
             free = {kind: _distortion(lines[name], drive, excited, count, kind) for kind in free}
         noise_error = noise / np.sqrt(2.0 * (count - 1) * length)
         channels.append(PeriodicChannel(name, noise, noise_error, frequency, np.abs(mean), error, **free))
     return Periods(length, length * dt, count, transient, excited, tuple(channels))
-
-
-def _unsettled(periods: NDArray[np.float64]) -> int:
-    """How many of the first periods (count, length) differ more from the last one than later ones do; two are kept."""
-    if len(periods) < 3:
-        return 0
-    apart = np.sqrt(np.mean((periods[:-1] - periods[-1]) ** 2, axis=1))
-    usual = float(np.median(apart[len(apart) // 2 :]))
-    settled = np.flatnonzero(apart <= SETTLED * usual)
-    return int(min(settled[0], len(periods) - 2))
 
 
 def _lines(periods: NDArray[np.float64]) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:

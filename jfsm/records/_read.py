@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from jfsm.records._record import Drive, Record
-from jfsm.records._units import find_sensitivity, find_unit
+from jfsm.records._units import KINDS, find_sensitivity, find_unit
 from jfsm.records.formats import Contents, format_of
 from jfsm.records.formats.base import point_name
 from jfsm.records.formats.clocks import clock_of
@@ -18,6 +18,7 @@ from jfsm.records.formats.lookup import (
     own_names,
     samples_of,
 )
+from jfsm.records.formats.rows import rows_where
 
 
 def read(
@@ -32,6 +33,7 @@ def read(
     units: Mapping[str, str] | None = None,
     sensitivity: Mapping[str, str] | None = None,
     rate: float | None = None,
+    where: Mapping[str, str | float] | None = None,
     at_rest: bool | None = None,
     drive: Drive | None = None,
     name: str | None = None,
@@ -61,6 +63,8 @@ def read(
         The numbers are in the raw unit of the sensitivity (mV) unless the file or `units` says another (V).
     rate : float, optional
         Samples per second [Hz] of a file without instants; the clock then begins at 0.
+    where : mapping of column to value, optional
+        Which rows of a long table to take, as ``{"specimen": "B", "run": 3}``; columns of text may be named, too.
     at_rest, drive, name : optional
         As for `Record`. By default what the file says, otherwise not at rest, driven by force, and the file's name.
 
@@ -75,32 +79,28 @@ def read(
     ModuleNotFoundError
         If its format needs an extra that is not installed.
     ValueError
-        If the format is not known, a name is not in the file, no clock is found, or the numbers make no `Record`.
+        If the format is not known, a name is not in the file, no row is left by `where`, no clock is found, channels
+        have clocks that differ, or the numbers make no `Record`.
 
     Notes
     -----
-    For anything more involved (input and output in two files, a run cut out of a long table) load the arrays and call
-    `Record` with them::
+    Input and output in two files, or channels of one file on clocks of their own, are read into a record each and
+    brought to one clock; pieces of one run are joined::
 
-        force, motion = scipy.io.loadmat("input.mat"), scipy.io.loadmat("output.mat")
-        samples = np.arange(force["u"].size) / force["fs"].item()
-        record = Record(samples, force=force["u"].ravel(), displacement=motion["y"].ravel())
+        record = jfsm.align([jfsm.read("input.mat", force="u"), jfsm.read("output.mat", displacement="y")])
+        record = jfsm.join([jfsm.read(path, force="u", displacement="y") for path in ("run_1.csv", "run_2.csv")])
+
+    For anything more involved load the arrays and call `Record` with them.
     """
     path = Path(path)
     file_format = format_of(path)
     with path.open("rb"):
         pass  # a file that is missing or locked is reported as such, whatever a library would make of it
-    wanted: dict[str, ChannelName] = {
-        "force": force,
-        "displacement": displacement,
-        "velocity": velocity,
-        "acceleration": acceleration,
-        "base_acceleration": base_acceleration,
-    }
+    contents = file_format.load(path)
     return record_of(
-        file_format.load(path),
+        rows_where(contents, path.name, where) if where else contents,
         path.name,
-        wanted,
+        (force, displacement, velocity, acceleration, base_acceleration),
         time=time,
         units=units or {},
         sensitivity=sensitivity or {},
@@ -115,7 +115,7 @@ def read(
 def record_of(
     contents: Contents,
     source: str,
-    wanted: Mapping[str, ChannelName],
+    wanted: Sequence[ChannelName],
     *,
     units: Mapping[str, str],
     sensitivity: Mapping[str, str],
@@ -126,8 +126,11 @@ def record_of(
     name: str | None = None,
     default_name: str | None = None,
 ) -> Record:
-    """The record in contents that messages call `source`; the other arguments and errors as those of `read`."""
-    named = {kind: names for kind, names in wanted.items() if names is not None}
+    """The record in contents that messages call `source`; `wanted` holds the names of each kind, in their order.
+
+    The other arguments and errors are those of `read`.
+    """
+    named = {kind: names for kind, names in zip(KINDS, wanted, strict=True) if names is not None}
     chosen = {
         kind: _by_dof(contents, source, kind, names) for kind, names in (named or own_names(contents, source)).items()
     }
@@ -149,8 +152,10 @@ def record_of(
     channels: dict[str, Any] = {}
     for kind, choices in chosen.items():
         arrays = {dof: samples_of(contents, source, choice) for dof, choice in choices.items()}
-        scaled = {dof: array * factors.get(choices[dof], 1.0) for dof, array in arrays.items()}
-        channels[kind] = scaled if None not in scaled else scaled[None]
+        for dof in arrays:
+            if choices[dof] in factors:
+                arrays[dof] = arrays[dof] * factors[choices[dof]]
+        channels[kind] = arrays if None not in arrays else arrays[None]
     record = Record(
         clock,
         **channels,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jfsm.records._channels import Columns, as_columns, as_single, as_time, frozen
+from jfsm.records._fold import fold
 from jfsm.records._resample import resampled
 from jfsm.records._units import KINDS, coherent_units, find_unit
 from jfsm.records._write import contents_of, write
@@ -210,7 +211,9 @@ class Record:
         return f"<Record{title}: {len(self)} samples over {self.duration:.6g} s; {measured}>"
 
     def __getitem__(self, samples: slice) -> Self:
-        """The samples of a slice on the same clock; `at_rest` is kept only by a slice that begins at sample 0.
+        """The samples of a slice on the same clock, with a note of what was cut off.
+
+        `at_rest` is kept only by a slice that begins at sample 0.
 
         Raises
         ------
@@ -234,11 +237,62 @@ class Record:
             )
         columns = {kind: (dofs, values[start:stop]) for kind, (dofs, values) in self._columns.items()}
         base = None if self._base_acceleration is None else self._base_acceleration[start:stop]
-        return self._with(self._time[start:stop], columns, base, at_rest=self._at_rest and start == 0)
+        time = self._time[start:stop]
+        part = self._with(time, columns, base, at_rest=self._at_rest and start == 0)
+        if len(part) == len(self):
+            return part
+        return part.noted(
+            f"Samples {start} to {stop - 1} of {len(self)} are kept, t = {time[0]:.6g} to {time[-1]:.6g} s."
+        )
 
     def until(self, time: float) -> Self:
-        """The part up to and including this instant [s]."""
+        """The part up to and including this instant [s]; notes and errors as of a slice."""
         return self[: int(np.searchsorted(self._time, time, side="right"))]
+
+    def since(self, time: float) -> Self:
+        """The part from this instant [s] on, itself included; notes and errors as of a slice."""
+        return self[int(np.searchsorted(self._time, time, side="left")) :]
+
+    def shifted(self, seconds: float) -> Self:
+        """The same samples on a clock that reads so many seconds [s] more, or less if negative, with a note.
+
+        For a channel that came late by a known time, ``shifted(-late)``, and for a recorder whose clock began anew.
+
+        Raises
+        ------
+        ValueError
+            If `seconds` is not finite.
+        """
+        if not np.isfinite(seconds):
+            raise ValueError(f"`seconds` must be a finite time; it was {seconds}. Pass seconds, as 0.0125.")
+        other = self._with(frozen(self._time + seconds), self._columns, self._base_acceleration, at_rest=self._at_rest)
+        return other.noted(f"The clock was put {'forward' if seconds >= 0 else 'back'} by {abs(seconds):.9g} s.")
+
+    def folded(self, period: int | None = None, *, transient: int = 0) -> "Record":
+        """The mean period of a record of periodic excitation: n samples become `period` samples with less noise.
+
+        Parameters
+        ----------
+        period : int, optional
+            Length of a period in samples; by default that after which the driving channels repeat themselves.
+        transient : int
+            Whole periods to leave out at the beginning, before the structure has settled. What is more than a whole
+            number of periods is left out there, too.
+
+        Returns
+        -------
+        Record
+            On the clock of the first period that is kept; not at rest. Its notes say what was averaged, by how much
+            each channel changed from period to period, and whether the first of the periods had not settled.
+
+        Raises
+        ------
+        TypeError
+            If `period` is not an integer.
+        ValueError
+            If no period is found, two periods are not left, or time is uneven.
+        """
+        return fold(self, period, transient)
 
     def resample(self, rate: float) -> Self:
         """The record on a uniform clock of `rate` samples per second [Hz], without aliasing.
@@ -251,18 +305,8 @@ class Record:
         ValueError
             If `rate` is not positive, or leaves fewer than two samples.
         """
-        blocks = [values for _, values in self._columns.values()]
-        if self._base_acceleration is not None:
-            blocks.append(self._base_acceleration[:, None])
-        together = np.concatenate(blocks, axis=1) if blocks else np.empty((len(self), 0))
-        time, values, note = resampled(self._time, together, rate, uneven=self._jitter > UNEVEN)
-        parts = np.split(values, np.cumsum([block.shape[1] for block in blocks])[:-1], axis=1) if blocks else []
-        columns = {
-            kind: (dofs, frozen(np.asfortranarray(part)))
-            for (kind, (dofs, _)), part in zip(self._columns.items(), parts, strict=False)
-        }
-        base = None if self._base_acceleration is None else frozen(parts[-1][:, 0].copy())
-        return self.noted(*self.notes)._with(frozen(time), columns, base, at_rest=self._at_rest).noted(note)
+        other, note = self._resampled(rate)
+        return other.noted(note)
 
     def noted(self, *notes: str) -> Self:
         """The same record with further notes; those it has are not repeated."""
@@ -321,17 +365,10 @@ class Record:
         from jfsm.records._read import record_of  # the reader makes records, a record only calls the reader
         from jfsm.records.formats.sep005 import contents_of_channels
 
-        wanted: dict[str, ChannelName] = {
-            "force": force,
-            "displacement": displacement,
-            "velocity": velocity,
-            "acceleration": acceleration,
-            "base_acceleration": base_acceleration,
-        }
         return record_of(
             contents_of_channels(channels),
             "`channels`",
-            wanted,
+            (force, displacement, velocity, acceleration, base_acceleration),
             units=units or {},
             sensitivity=sensitivity or {},
             at_rest=at_rest,
@@ -358,6 +395,21 @@ class Record:
         """Largest relative deviation of a step from the mean step."""
         mean = self.duration / (len(self) - 1)
         return float(np.max(np.abs(np.diff(self._time) / mean - 1.0)))
+
+    def _resampled(self, rate: float, span: tuple[float, float] | None = None) -> tuple[Self, str]:
+        """The record at `rate` [Hz] over a span of time [s], by default its own, and the note that goes with it."""
+        blocks = [values for _, values in self._columns.values()]
+        if self._base_acceleration is not None:
+            blocks.append(self._base_acceleration[:, None])
+        together = np.concatenate(blocks, axis=1) if blocks else np.empty((len(self), 0))
+        time, values, note = resampled(self._time, together, rate, self._jitter > UNEVEN, span)
+        parts = np.split(values, np.cumsum([block.shape[1] for block in blocks])[:-1], axis=1) if blocks else []
+        columns = {
+            kind: (dofs, frozen(np.asfortranarray(part)))
+            for (kind, (dofs, _)), part in zip(self._columns.items(), parts, strict=False)
+        }
+        base = None if self._base_acceleration is None else frozen(parts[-1][:, 0].copy())
+        return self.noted(*self.notes)._with(frozen(time), columns, base, at_rest=self._at_rest), note
 
     def _with(self, time: Channel, columns: dict[str, Columns], base: Channel | None, at_rest: bool) -> Self:
         """The same test with other samples, which are trusted."""

@@ -4,21 +4,25 @@ from collections.abc import Iterator, Mapping
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jfsm.records._quantisation import quantisation_step
 from jfsm.records._tapers import Samples
 
 HELD = 5  # equal samples in a row, within the record, that no continuous channel has
 RAREST, TOGETHER, CHANCE = 1e-5, 3.0, 0.05  # share of equal neighbours at least; how far they cluster; a hang by chance
+GENTLE = 0.1  # of the usual step, and of a velocity's standard deviation: beside it, a channel stands still
+MOSTLY = 0.5  # share of samples in long runs, above which a channel is a staircase
 SAME = 1e-9  # share of the standard deviation by which copies may differ
 
 
 def longest_hold(y: Samples) -> tuple[int, int]:
     """First sample and length of the longest run of equal values inside a continuous channel; 0 and 0 without one.
 
-    Runs at the start and the end are rest, and those at the extreme values clipping. A quantised channel repeats its
-    values anyway, and so does one that was computed from such a channel: a run must be longer than the short ones let
-    expect.
+    Runs at the start and the end are rest, and so are those that the channel comes to and leaves gently, as a joint
+    that sticks does where it turns; those at the extreme values are clipping. A quantised channel repeats its values
+    anyway, and so does one that was computed from such a channel: a run must be longer than the short ones let expect.
+    A channel that mostly holds is switched in steps.
     """
     same = np.diff(y) == 0
     if quantisation_step(y) or repetition(y) > 1:
@@ -27,6 +31,9 @@ def longest_hold(y: Samples) -> tuple[int, int]:
     starts, ends = edges[::2], edges[1::2] + 1
     inside = (starts > 0) & (ends < y.size) & (y[starts] > y.min()) & (y[starts] < y.max())
     lengths = np.where(inside, ends - starts, 0)
+    if np.sum(lengths[lengths >= HELD]) > MOSTLY * y.size:
+        return 0, 0
+    lengths = np.where(inside & ~_gentle(y, np.maximum(starts, 1), np.minimum(ends, y.size - 1)), lengths, 0)
     if lengths.size == 0 or lengths.max() < HELD:
         return 0, 0
     longest = int(np.argmax(lengths))
@@ -35,6 +42,16 @@ def longest_hold(y: Samples) -> tuple[int, int]:
     if y.size * usual ** ((lengths[longest] - 1) / TOGETHER) > CHANCE:
         return 0, 0
     return int(starts[longest]), int(lengths[longest])
+
+
+def _gentle(y: Samples, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which runs of equal values, from `starts` to before `ends`, the channel comes to and leaves as if it stood still.
+
+    Of a displacement both steps are small beside the usual step; a velocity is 0 then, and was small before.
+    """
+    step = np.maximum(np.abs(y[starts] - y[starts - 1]), np.abs(y[ends] - y[ends - 1]))
+    slow = step <= GENTLE * np.sqrt(np.mean(np.diff(y) ** 2))
+    return slow | ((y[starts] == 0) & (step <= GENTLE * y.std()))
 
 
 def repetition(y: Samples) -> int:

@@ -12,38 +12,49 @@ KAISER = 9.0  # side lobes of its window below −90 dB; the transition band is 
 PASSBAND = 0.91  # cut-off over the lower of the two Nyquist frequencies: the transition ends there
 CLOSE = 0.1  # samples nearer than this share of the median step are one reading
 GAP = 3.0  # median steps without a sample from which on an interpolation is worth a word
+HAIR = 1e-6  # of a sample, that rounding makes of none
 ROUNDED = 0.25  # share of a step up to which the digits of a time stamp may be missing
 MEMORY, FITTED = 48, 1024  # order of the prediction beyond the ends, and samples it is learnt from
 BATCH = 1 << 20  # products held at once
 
 
-def resampled(time: Samples, values: Samples, rate: float, uneven: bool) -> tuple[Samples, Samples, str]:
+def resampled(
+    time: Samples, values: Samples, rate: float, uneven: bool, span: tuple[float, float] | None = None
+) -> tuple[Samples, Samples, str]:
     """Instants, samples (n, channels) at `rate` [Hz], and a sentence that says what was done.
+
+    The instants go from the first to the last of `span` [s], by default those of `time`.
 
     Raises
     ------
     ValueError
         If `rate` is not positive, or leaves fewer than two samples.
     """
-    duration = time[-1] - time[0]
+    duration = time[-1] - time[0] if span is None else span[1] - span[0]
     if not (np.isfinite(rate) and rate > 0 and duration * rate >= 1.0):
         raise ValueError(
             f"`rate` must be a positive number of samples per second with at least two of them in {duration:.6g} s; "
             f"it was {rate}. Pass at least {1 / duration:.6g}."
         )
-    note = f"Resampled from {(time.size - 1) / duration:.6g} to {rate:.6g} Hz"
+    note = f"Resampled from {(time.size - 1) / (time[-1] - time[0]):.6g} to {rate:.6g} Hz"
     if uneven and (resolution := _rounding(time)):
         slope, start = np.polyfit(np.arange(time.size), time, 1)
         time = start + slope * np.arange(time.size)
-        duration = time[-1] - time[0]
         note += f"; its uniform clock was written to {resolution:.3g} s only"
     elif uneven:
         values, gap = _even(time, values)
         note += f", by cubic interpolation of uneven samples with gaps of up to {gap:.6g} s"
-    source_rate = (values.shape[0] - 1) / duration
-    count = int(np.floor(duration * rate * (1.0 + 1e-12))) + 1
-    instants = time[0] + np.arange(count) / rate
-    return instants, _filtered(values, np.arange(count) * (source_rate / rate), rate / source_rate), note + "."
+    source_rate = (values.shape[0] - 1) / (time[-1] - time[0])
+    start, end = (time[0], time[-1]) if span is None else span
+    steps = np.arange(int(np.floor((end - start) * rate * (1.0 + 1e-12) + HAIR)) + 1)
+    position = (start - time[0]) * source_rate + steps * (source_rate / rate)
+    kept = round(position[0]) + steps
+    if kept[-1] < values.shape[0] and np.all(np.abs(position - kept) <= HAIR):
+        values = values[kept[0] : kept[-1] + 1]
+        note = note if uneven else f"Kept as sampled, at {rate:.6g} Hz"
+    else:
+        values = _filtered(values, position, rate / source_rate)
+    return start + steps / rate, values, note + "."
 
 
 def _rounding(time: Samples) -> float:

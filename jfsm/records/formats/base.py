@@ -54,6 +54,8 @@ class Contents:
         rotations about them, negative ones the other way.
     notes : sequence of str
         What else the file says that a reader of the record should know, one sentence each.
+    texts : mapping of name to (n,) array of str
+        Columns as written, of a table in which some may be text.
     """
 
     arrays: Mapping[str, NDArray[Any]]
@@ -63,6 +65,7 @@ class Contents:
     kinds: Mapping[str, str] = field(default_factory=dict)
     points: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    texts: Mapping[str, NDArray[np.str_]] = field(default_factory=dict)
 
 
 class AbstractFormat(abc.ABC):

@@ -64,8 +64,8 @@ def _common(contents: Contents, source: str, chosen: Sequence[Choice]) -> NDArra
         elif not np.array_equal(first[1], clock):
             raise ValueError(
                 f"{source} must have channels of one clock to make one record; {first[0]!r} {_described(first[1])}, "
-                f"{choice.array!r} {_described(clock)}. Read them into a record each, and bring these to one rate by "
-                f"record.resample(rate); or pass rate=... [Hz] if the file is wrong."
+                f"{choice.array!r} {_described(clock)}. Read them into a record each, and bring these to one clock by "
+                f"jfsm.align(records); or pass rate=... [Hz] if the file is wrong."
             )
     return None if first is None else first[1]
 

@@ -32,7 +32,7 @@ class TextFormat(AbstractFormat):
         middle = next((line for _, line in itertools.islice(_rows(path, encoding), count // 2, None)), "")
         delimiter, pattern = _layout(path, middle)
         head = _head(_rows(path, encoding), delimiter, pattern)
-        table = _Table(path, delimiter, len(pattern))
+        table = _Table(path, delimiter, (count - len(head), len(pattern)))
         rows = itertools.islice(_rows(path, encoding), len(head), None)
         while block := list(itertools.islice(rows, BLOCK)):
             table.append(block)
@@ -45,7 +45,13 @@ class TextFormat(AbstractFormat):
         labels, units = _names_and_units(above)
         names = unique_names(labels)
         stated = {name: unit for name, unit in zip(names, units, strict=True) if unit}
-        return Contents(Lazy(names, lambda name: table.column(names.index(name), name)), stated, about)
+
+        def texts(name: str) -> np.ndarray:
+            data = itertools.islice(_rows(path, encoding), len(head), None)
+            return np.array([_fields(line, delimiter)[names.index(name)] for _, line in data])
+
+        numbers = Lazy(names, lambda name: table.column(names.index(name), name))
+        return Contents(numbers, stated, about, texts=Lazy(names, texts))
 
     def save(self, path: Path, contents: Contents) -> None:
         columns = [np.asarray(array, dtype=np.float64) for array in contents.arrays.values()]
@@ -62,9 +68,10 @@ class TextFormat(AbstractFormat):
 class _Table:
     """The rows of data as columns of doubles, filled block by block so that only one block is text at a time."""
 
-    def __init__(self, path: Path, delimiter: str | None, width: int):
-        self._path, self._delimiter, self._width = path, delimiter, width
-        self._blocks: list[np.ndarray] = []  # (rows, width) each
+    def __init__(self, path: Path, delimiter: str | None, shape: tuple[int, int]):
+        self._path, self._delimiter, self._width = path, delimiter, shape[1]
+        self._values = np.empty(shape)
+        self._filled = 0  # rows so far
         self._text: dict[int, tuple[int, str]] = {}  # column -> line and field that is no number
         self._last_is_empty = True  # as when every row ends in a delimiter
 
@@ -92,7 +99,8 @@ class _Table:
             self._last_is_empty = False
             if values.shape[1] != self._width:
                 values = self._by_field(block)
-        self._blocks.append(values)
+        self._values[self._filled : self._filled + len(block)] = values
+        self._filled += len(block)
 
     def column(self, place: int, name: str) -> np.ndarray:
         """(rows,) numbers of one column.
@@ -108,7 +116,7 @@ class _Table:
                 f"{self._path.name} must hold numbers in column {name!r}; line {number} holds {found!r}. "
                 f"Repair or remove that line, or read another column."
             )
-        return np.concatenate([block[:, place] for block in self._blocks])
+        return self._values[:, place]
 
     def _by_field(self, block: list[Line]) -> np.ndarray:
         values = np.full((len(block), self._width), np.nan)
