@@ -94,9 +94,9 @@ _COMPILING: list[float] = []
 """Seconds that this process has traced and compiled, once it counts them."""
 
 
-def _count(event: str, seconds: float, **_: Any) -> None:
+def _count(event: str, duration_secs: float, **_: Any) -> None:
     if event.startswith("/jax/core/compile/"):
-        _COMPILING[0] += seconds
+        _COMPILING[0] += duration_secs
 
 
 def _draw(cause: str, seed: int, noise: float, excitations: Sequence[str]) -> Challenge:

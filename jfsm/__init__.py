@@ -1,76 +1,34 @@
-"""jfsm: what a simulation gets wrong, the name of the cause, and the gain of mending it."""
+"""jfsm: what a simulation gets wrong, the name of the cause, and the gain of mending it.
 
-from . import systems as systems
-from .diagnosis import Diagnosis as Diagnosis
-from .diagnosis import diagnose as diagnose
-from .dynamics import Backbone as Backbone
-from .dynamics import FixedPoint as FixedPoint
-from .dynamics import ForcedResponse as ForcedResponse
-from .dynamics import LimitCycle as LimitCycle
-from .dynamics import Linearisation as Linearisation
-from .dynamics import Response as Response
-from .dynamics import Responses as Responses
-from .dynamics import backbone as backbone
-from .dynamics import fixed_points as fixed_points
-from .dynamics import forced_response as forced_response
-from .dynamics import limit_cycles as limit_cycles
-from .dynamics import linearise as linearise
-from .dynamics import simulate as simulate
-from .dynamics import simulate_many as simulate_many
-from .estimation import Motion as Motion
-from .estimation import estimate_motion as estimate_motion
-from .identification import Fit as Fit
-from .identification import fit as fit
-from .records import Record as Record
-from .records import align as align
-from .records import join as join
-from .records import read as read
-from .structures import AccelerationBias as AccelerationBias
-from .structures import AccelerationGain as AccelerationGain
-from .structures import AttachedOscillator as AttachedOscillator
-from .structures import BilinearDamping as BilinearDamping
-from .structures import BilinearStiffness as BilinearStiffness
-from .structures import BoucWen as BoucWen
-from .structures import Cause as Cause
-from .structures import ChannelDelay as ChannelDelay
-from .structures import Clipping as Clipping
-from .structures import CosineStiffness as CosineStiffness
-from .structures import Coulomb as Coulomb
-from .structures import CoulombAsymmetric as CoulombAsymmetric
-from .structures import CubicDamping as CubicDamping
-from .structures import CubicStiffness as CubicStiffness
-from .structures import DampedStop as DampedStop
-from .structures import DampingDrift as DampingDrift
-from .structures import DeadZone as DeadZone
-from .structures import DelayedForce as DelayedForce
-from .structures import DoubleWell as DoubleWell
-from .structures import EndStop as EndStop
-from .structures import ForceDelay as ForceDelay
-from .structures import ForceGain as ForceGain
-from .structures import FreePlay as FreePlay
-from .structures import Iwan as Iwan
-from .structures import Jenkins as Jenkins
-from .structures import LinearDamping as LinearDamping
-from .structures import LinearStiffness as LinearStiffness
-from .structures import LuGre as LuGre
-from .structures import Maxwell as Maxwell
-from .structures import Offset as Offset
-from .structures import ParametricStiffness as ParametricStiffness
-from .structures import PeriodicDisturbance as PeriodicDisturbance
-from .structures import PositionDamping as PositionDamping
-from .structures import PowerDamping as PowerDamping
-from .structures import Preload as Preload
-from .structures import QuadraticDamping as QuadraticDamping
-from .structures import QuadraticStiffness as QuadraticStiffness
-from .structures import QuinticStiffness as QuinticStiffness
-from .structures import Saturation as Saturation
-from .structures import SineStiffness as SineStiffness
-from .structures import SmoothCoulomb as SmoothCoulomb
-from .structures import SquareStiffness as SquareStiffness
-from .structures import StiffnessDrift as StiffnessDrift
-from .structures import StiffnessDrop as StiffnessDrop
-from .structures import Stribeck as Stribeck
-from .structures import Structure as Structure
-from .structures import VanDerPol as VanDerPol
-from .structures import causes as causes
-from .surrogates import RKPM as RKPM
+The public names are listed in ``__init__.pyi``. Each is imported when it is first asked for: help on the command line,
+or a record that is only read, need not wait for JAX.
+"""
+
+import ast
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+_ROOMS = {
+    name.asname or name.name: line.module
+    for line in ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")).body
+    if isinstance(line, ast.ImportFrom)
+    for name in line.names
+}
+"""The room of each public name; None for a public name that is a room."""
+
+__all__ = list(_ROOMS)  # pyright: ignore[reportUnsupportedDunderAll]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _ROOMS.values() or name in _ROOMS and _ROOMS[name] is None:
+        return import_module(f"{__name__}.{name}")
+    if name not in _ROOMS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = getattr(import_module(f"{__name__}.{_ROOMS[name]}"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -55,9 +55,7 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(function)
     def run(**options: Any) -> None:
         try:
-            import jax
-
-            jax.config.update("jax_enable_x64", True)
+            _use_doubles()
             function(**options)
         except BrokenPipeError:  # whoever read the output has seen enough; typer ends such a process in silence
             raise
@@ -71,6 +69,14 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
             raise typer.Exit(NOT_FINISHED) from None
 
     return app.command()(run)
+
+
+def _use_doubles() -> None:
+    """Double precision from here on, without loading JAX for a command that needs none."""
+    if "jax" in sys.modules:
+        sys.modules["jax"].config.update("jax_enable_x64", True)
+    else:
+        os.environ["JAX_ENABLE_X64"] = "1"  # read when it is loaded
 
 
 @dataclass(frozen=True)
@@ -130,11 +136,15 @@ def takes_record(function: Callable[..., None]) -> Callable[..., None]:
 
 @command
 @takes_record
-def inspect(source: RecordFile) -> None:
+def inspect(
+    source: RecordFile, report: Annotated[Path | None, _option("Write the page here, as HTML.")] = None
+) -> None:
     """Show what a record holds, and what is odd about it."""
-    from .reporting import print_inspection
-
-    print_inspection(source.read().inspect().to_dict())
+    _check_outputs({"--report": report}, [source.record])
+    inspection = source.read().inspect()
+    if report is not None:
+        inspection.report(report)
+    inspection.print()  # last, so that a reader who closes the pipe loses no file
 
 
 @command

@@ -176,3 +176,18 @@ def test_importing_jfsm_changes_no_configuration_and_prints_nothing():
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=PACKAGE.parent)
     assert run.returncode == 0, run.stderr
     assert (run.stdout, run.stderr) == ("", "")
+
+
+def test_every_public_name_is_there_and_a_wrong_one_is_missed():
+    program = (
+        "import jfsm, sys\n"
+        "assert 'jax' not in sys.modules, 'a name was imported before it was asked for'\n"
+        "assert {'Record', 'diagnose', 'systems'} <= set(jfsm.__all__) <= set(dir(jfsm))\n"
+        "assert all(getattr(jfsm, name) is getattr(jfsm, name) for name in jfsm.__all__)\n"
+        "assert jfsm.dynamics.simulate is jfsm.simulate\n"
+        "assert not hasattr(jfsm, 'Recrod')\n"
+        "from jfsm import *\n"
+        "assert diagnose is jfsm.diagnosis.diagnose\n"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=PACKAGE.parent)
+    assert run.returncode == 0, run.stderr

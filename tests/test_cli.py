@@ -104,6 +104,14 @@ def test_a_record_is_inspected_in_the_units_that_are_given(channels):
     assert "displacement 1" in flat(result.stdout) or "displac" in result.stdout
 
 
+def test_an_inspection_is_written_as_a_page(channels, tmp_path):
+    result = run("inspect", *channels, "--report", tmp_path / "page.html")
+    assert (result.exit_code, result.stderr) == (0, "")
+    page = (tmp_path / "page.html").read_text()
+    assert page.startswith("<!DOCTYPE html>") and "displacement 1" in page
+    assert "displacement 1" in flat(result.stdout)
+
+
 def test_a_rate_stands_for_a_clock(tmp_path):
     np.savez(tmp_path / "run.npz", u=np.sin(np.arange(100.0)), y=np.cos(np.arange(100.0)))
     result = run("inspect", tmp_path / "run.npz", "--force", "u", "--displacement", "y", "--rate", 610.35)
@@ -315,6 +323,7 @@ def test_a_holdout_that_is_neither_share_nor_file_is_refused(channels, folder):
     [
         ("simulate", "--out", "run.csv"),
         ("fit", "--out", "model.toml"),
+        ("inspect", "--report", "run.csv"),
         ("diagnose", "--report", "run.csv"),
         ("diagnose", "--json", "model.toml"),
         ("diagnose", "--extended", "model.toml"),
@@ -325,9 +334,10 @@ def test_no_input_is_written_over(command, option, name, channels, folder):
     second = folder / "second.csv"
     second.write_bytes((folder / "run.csv").read_bytes())
     before = (folder / name).read_bytes()
-    more = ["--holdout", second] if command == "diagnose" else []
+    more = [] if command == "inspect" else ["--model", folder / "model.toml"]
+    more += ["--holdout", second] if command == "diagnose" else []
     through = folder / "." / ".." / folder.name / name  # another way to write the same place
-    text = refusal(command, *channels, "--model", folder / "model.toml", *more, option, through)
+    text = refusal(command, *channels, *more, option, through)
     assert f"{option} must not be a file that is needed: {through} is an input of this command." in text
     assert (folder / name).read_bytes() == before
 
@@ -470,6 +480,33 @@ def test_a_reader_who_leaves_early_costs_no_file_and_gets_no_complaint(channels,
     result = run("diagnose", *channels, "--model", folder / "model.toml", "--json", tmp_path / "d.json")
     assert (result.exit_code, result.stderr) == (1, "")
     assert (tmp_path / "d.json").exists()
+
+
+@pytest.mark.parametrize(("words", "code"), [(["--help"], 0), (["diagnose"], 2), (["inspect", "run.csv", "--no"], 2)])
+def test_help_and_mistyped_options_wait_for_nothing(words, code):
+    program = (
+        "import sys; from jfsm.cli import app\n"
+        f"try: app({words!r})\n"
+        "except SystemExit as end: code = end.code\n"
+        "heavy = sorted({'jax', 'numpy', 'scipy', 'matplotlib'} & set(sys.modules))\n"
+        f"sys.exit(0 if code == {code} and not heavy else ('loaded', heavy, 'ended with', code))"
+    )
+    finished = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, cwd=Path(__file__).resolve().parents[1]
+    )
+    assert finished.returncode == 0, finished.stderr
+
+
+def test_an_inspection_waits_for_no_jax(channels):
+    program = (
+        "import sys; from jfsm.cli import app\n"
+        f"try: app({['inspect', *map(str, channels)]!r})\n"
+        "except SystemExit as end: sys.exit(end.code or 'jax' in sys.modules)"
+    )
+    finished = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, cwd=Path(__file__).resolve().parents[1]
+    )
+    assert finished.returncode == 0, finished.stderr
 
 
 def test_a_process_needs_no_setting_beforehand(channels, folder, tmp_path):

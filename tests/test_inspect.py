@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from jfsm.records import Record, noise_floor, silent_forces
+from jfsm.records._figures import plus_minus, share
 
 T = np.arange(2000) * 0.01
 RNG = np.random.default_rng(0)
@@ -45,8 +46,8 @@ def test_a_sound_record_raises_no_warning_and_has_its_figures():
         (np.full(2000, 4.0), "warning", "Constant at 4 m. Leave a dead channel out"),
         (MOTION + 0.3 * RNG.standard_normal(2000), "warning", "Noise of 0.3"),
         (RNG.standard_normal(2000), "info", "Noise only"),
-        (np.sin(2 * np.pi * 20.0 * T), "warning", "The signal reaches the band limit"),
-        (np.sin(2 * np.pi * 20.0 * T), "warning", "Strongest at 20 Hz: 400 periods of 5 samples"),
+        (np.sin(2 * np.pi * 20.0 * T), "warning", "Much of the signal has fewer than 8 samples a period"),
+        (np.sin(2 * np.pi * 20.0 * T), "warning", "Strongest at 20 Hz: 400 periods of only 5 samples"),
         (np.sin(6.0 * T), "info", "Amplitude stays within 1 of 10 bands"),
     ],
 )
@@ -107,8 +108,68 @@ def test_gaps_and_uneven_steps_are_reported_with_the_remedy():
     assert any("record.resample(100)" in found for found in warnings)
     assert any("2 gaps, of at most 0.41 s (after t = 9.99 s). Do not fit across it" in found for found in warnings)
     few = Record(np.delete(T, 500), displacement=np.delete(MOTION, 500))
-    assert any("1 gaps, of at most 0.02 s" in found for found in messages(few, "info", "record"))
+    assert any("1 gap, of at most 0.02 s" in found for found in messages(few, "info", "record"))
     assert record.inspect().channels[0].noise == pytest.approx(0.01, rel=0.15)
+
+
+def test_warnings_come_first_and_findings_stand_by_channel():
+    rough = MOTION + 0.3 * RNG.standard_normal(2000)
+    coloured = 0.02 * np.diff(RNG.standard_normal(2001))  # which is said after all that is said of one channel
+    record = Record(T, force=FORCE + coloured, displacement={1: MOTION + 0.3, 2: rough + 0.3}).noted("cut by hand")
+    places = ["record", "force 1", "displacement 1", "displacement 2"]
+    order = [(finding.severity, places.index(finding.channel)) for finding in record.inspect().findings]
+    assert order == sorted(order, key=lambda one: (one[0] == "info", one[1]))
+    assert {severity for severity, _ in order} == {"info", "warning"}
+
+
+def test_the_samples_are_kept_with_their_defects():
+    y = np.clip(MOTION, -0.8, 0.8)
+    y[700] += 9.0
+    inspection = Record(T, force=FORCE, displacement=y).inspect()
+    force, motion = inspection.traces
+    assert (force.channel, motion.unit) == ("force 1", "m")
+    np.testing.assert_array_equal(motion.samples, y)
+    np.testing.assert_array_equal(np.flatnonzero(motion.spikes), [700])
+    np.testing.assert_array_equal(np.flatnonzero(motion.lost), np.flatnonzero(motion.clipped | motion.spikes))
+    assert not force.lost.any()
+    assert inspection.drives == ("force 1",)
+    assert Record(T, displacement=MOTION).inspect().drives == ()
+
+
+def test_a_report_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
+    inspection = Record(T, displacement=MOTION).inspect()
+    path = tmp_path / "page.html"
+    path.write_text("old")
+    monkeypatch.setattr("jfsm.reporting.render_inspection", lambda d: "x" * len(d["name"]))  # the name is None
+    with pytest.raises(TypeError):
+        inspection.report(path)
+    assert path.read_text() == "old"
+    monkeypatch.undo()
+    inspection.report(str(path))
+    assert path.read_text().startswith("<!DOCTYPE html>")
+    with pytest.raises(FileNotFoundError, match="must be a file in a folder"):
+        inspection.report(tmp_path / "gone" / "page.html")
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (0.00612, 1.2e-4, "0.0061 ± 0.0001"),
+        (0.4, 0.02, "0.40 ± 0.02"),
+        (-14.2, 3.0, "-14 ± 3"),
+        (1234.0, 20.0, "1234 ± 20"),
+        (1.79e-7, 2e-9, "1.79e-07 ± 2e-09"),
+        (0.0, 1e-9, "0e+00 ± 1e-09"),
+        (0.400133, 1e-6, "0.4001 ± 1e-06"),
+        (4.0, 0.0, "4"),
+    ],
+)
+def test_a_figure_ends_where_its_error_begins(value, error, text):
+    assert plus_minus(value, error) == text
+
+
+def test_shares_too_small_to_show_say_so():
+    assert [share(part) for part in (1e-6, 0.0023, 0.276)] == ["less than 0.01%", "0.23%", "27.6%"]
 
 
 def test_notes_of_the_record_are_repeated():
@@ -128,5 +189,5 @@ def test_the_page_is_plain_data_and_can_be_printed(capsys):
     assert set(plain["findings"][0]) == {"severity", "channel", "message"}
     inspection.print()
     shown = capsys.readouterr().out
-    assert "run 7: 2000 samples over 19.99 s at 100 Hz" in shown
+    assert "run 7  2000 samples, 19.99 s, 100 Hz" in shown
     assert "displacement 1: Offset of 0.3" in shown

@@ -9,7 +9,9 @@ from jfsm.records import Record, clipped, noise_floor
 from jfsm.records._coherence import coherence
 from jfsm.records._level import level
 from jfsm.records._noise_spectrum import noise_spectrum
+from jfsm.records._phase_plane import phase_plane
 from jfsm.records._repeats import copies, longest_hold, repetition
+from jfsm.records._spectrum import spectrum
 
 DT, N = 0.01, 3000
 T = DT * np.arange(N)
@@ -45,7 +47,7 @@ def test_slow_motion_widens_the_error_of_the_offset():
 
 def test_a_drift_is_said_with_its_size():
     (message,) = [words for words in messages("info", displacement=WAVE + 0.4 * T / T[-1]) if "Drifts" in words]
-    assert "Drifts by 0.4 ±" in message
+    assert "Drifts by 0.4001 ± 1e-06 m over the record, 50.3% of" in message
     assert not any("Drifts" in words for words in messages("info", displacement=WAVE + white(2)))
 
 
@@ -125,6 +127,27 @@ def test_noise_over_frequency_has_the_density_of_white_noise():
     assert found.frequency.min() > 11.0 / (2 * np.pi)
 
 
+def test_a_spectrum_holds_the_power_of_its_channel():
+    y = WAVE + 3.0 + white(12, 0.3)
+    found = spectrum("x", y, DT)
+    assert found is not None
+    assert found.density.sum() * found.frequency[0] / 3.0 == pytest.approx(y.var(), rel=0.1)
+    assert found.frequency[np.argmax(found.density)] == pytest.approx(6.0 / (2 * np.pi), abs=found.frequency[0] / 3.0)
+    assert found.density[found.frequency > 5.0].mean() == pytest.approx(2 * 0.3**2 * DT, rel=0.1)
+    assert spectrum("x", y[:100], DT) is None
+
+
+def test_the_phase_plane_tells_where_a_motion_has_been():
+    circle = phase_plane(3.0 + 2.0 * np.sin(6.0 * T), DT)
+    assert (circle.centre, circle.reach) == pytest.approx((3.0, 2.0), abs=0.02)
+    assert circle.rate_reach == pytest.approx(12.0, rel=0.01)
+    assert circle.time.sum() == pytest.approx(1.0)
+    assert circle.time[4:6, 4:6].sum() == 0.0
+    assert circle.time[-1, 4:6].sum() > 0.05
+    decay = phase_plane(np.exp(-0.2 * T) * np.sin(6.0 * T), DT)
+    assert circle.coverage < 0.5 < 0.9 < decay.coverage
+
+
 def test_coloured_noise_is_told():
     rough = np.diff(white(13, n=N + 1)) / np.sqrt(2)
     assert any("Noise is not white" in words for words in messages("info", displacement=WAVE + rough))
@@ -151,7 +174,7 @@ def test_a_noisy_crest_cut_off_at_one_level_is_clipped_however_gently_it_comes_t
 def test_bends_are_not_taken_for_a_signal_at_the_band_limit():
     bent = np.abs(np.sin(6.0 * T)) * np.sin(11.0 * T) + white(15, 1e-5)
     assert noise_floor(bent, DT).spacing == 2
-    assert any("jumps between samples" in words for words in messages("info", displacement=bent))
+    assert any("jumps within a sample" in words for words in messages("info", displacement=bent))
     assert messages("warning", displacement=bent) == []
 
 
@@ -164,13 +187,11 @@ def test_spikes_where_the_velocity_turns_are_put_down_to_friction(at, severity):
     assert any("6 of 3000 samples are spikes" in words for words in found)
 
 
-def test_noise_of_a_signal_at_the_band_limit_is_called_an_upper_bound_and_no_fault():
+def test_noise_of_a_signal_at_the_band_limit_is_no_fault_of_its_own():
     lines = np.arange(1, 650)
     fast = np.cos(np.outer(np.arange(N), lines * np.pi / 1000) + lines**2).sum(axis=1)
-    found = messages("info", "force 1", force=fast, displacement=WAVE + white(1))
-    assert any(words.startswith("Noise of at most") for words in found)
     warned = messages("warning", "force 1", force=fast, displacement=WAVE + white(1))
-    assert any("reaches the band limit" in words for words in warned)
+    assert any("part of the noise may be signal" in words for words in warned)
     assert not any("Noise of" in words for words in warned)
 
 

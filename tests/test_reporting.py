@@ -27,8 +27,17 @@ from jfsm.reporting import (
     write_text_atomically,
 )
 from jfsm.reporting._curves import envelope, loudest_stretch
-from jfsm.reporting._quantities import interval, number, percent, probability, quantity
-from jfsm.reporting._wording import place_name
+from jfsm.reporting._quantities import (
+    interval,
+    number,
+    percent,
+    power_of_ten,
+    probability,
+    quantity,
+    rate_unit,
+    with_error,
+)
+from jfsm.reporting._wording import listed, place_name
 
 VERDICTS = ("consistent", "parameters", "cause", "unnamed", "undecided")
 PARTS = ("record", "model", "extended", "findings", "candidates", "refitted", "gain", "notes", "detectable", "timing")
@@ -319,7 +328,7 @@ def test_text_keeps_to_its_width():
 
 def test_text_of_an_inspection_shows_channels_and_remarks_as_they_are():
     text = inspection_text(inspection())
-    assert "run 7  2000 samples, 19.99 s, 100.00 Hz" in text
+    assert "run 7  2000 samples, 19.99 s, 100 Hz" in text
     assert "displacement 1: 12 samples are clipped [at 0.021 m]." in text
     assert "Nothing odd was found." in inspection_text({"name": None, "channels": [], "findings": []})
 
@@ -502,6 +511,15 @@ def test_an_envelope_keeps_the_extremes():
     assert (thin_y.max(), thin_y.min()) == (99.0, y.min())
 
 
+def test_an_envelope_for_a_logarithmic_axis_is_fine_where_the_axis_is_wide():
+    x = np.arange(1.0, 100_001.0)
+    thin, _ = envelope(x, np.sin(x), columns=500, log=True)
+    assert thin.size <= 1000
+    decades = np.histogram(thin, 10.0 ** np.arange(6))[0]
+    assert decades[0] == 9 and decades[-1] < 0.3 * thin.size
+    assert thin[0] == 1.0 and thin[-1] > 0.95 * x[-1]
+
+
 def test_the_loudest_stretch_holds_the_largest_value_and_a_few_periods():
     t = np.linspace(0, 100, 10_001)
     stretch = loudest_stretch(np.sin(2 * np.pi * t) * np.exp(-((t - 60) ** 2) / 400))
@@ -537,6 +555,36 @@ def test_intervals_share_the_prefix_of_their_value_and_show_their_width():
     assert interval(9.998e-3, 10.012e-3, "m", 10.003e-3) == "[9.998, 10.012]"
     assert interval(0.8, 1.2, "N", 1.0) == "[0.80, 1.20]"
     assert interval(None, 1.0, "N", 1.0) == ""
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "unit", "text"),
+    [
+        (0.00507, 9e-4, "V", "5.1 ± 0.9 mV"),
+        (2.374e-8, 1.1e-9, "m", "24 ± 1 nm"),
+        (-1.4, 0.06, "N", "−1.40 ± 0.06 N"),
+        (812.0, 31.0, "m", "812 ± 31 m"),
+        (1.2e-7, 1e-9, "kg", "1.20 × 10⁻⁷ ± 1 × 10⁻⁹ kg"),
+        (0.2, None, "m", "0.200 m"),
+        (0.0, 0.0, "m", "0 m"),
+        (None, 0.1, "m", "–"),
+    ],
+)
+def test_an_error_says_where_its_value_ends(value, error, unit, text):
+    assert with_error(value, error, unit) == text
+
+
+def test_powers_of_ten_label_an_axis_and_nothing_else_does():
+    labels = [power_of_ten(value) for value in (0.01, 1.0, 1000.0, 1e-5, 1e4, 2.0, 0.0)]
+    assert labels == ["0.01", "1", "1000", "10⁻⁵", "10⁴", "", ""]
+
+
+def test_a_rate_of_change_has_its_unit():
+    assert [rate_unit(unit) for unit in ("m", "m/s", "V", None)] == ["m/s", "m/s²", "V/s", "1/s"]
+
+
+def test_names_are_listed_as_one_says_them():
+    assert [listed(names) for names in (["a"], ["a", "b"], ["a", "b", "c"])] == ["a", "a and b", "a, b and c"]
 
 
 def test_no_probability_is_certain():

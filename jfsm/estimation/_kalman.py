@@ -54,7 +54,7 @@ def _filtered(model: LinearModel, pushed, seen, use, swell) -> _Filtered:
         noise = model.noise if model.wander is None else model.noise + swell * model.wander
         onward = (model.step @ mean + push, model.step @ covariance @ model.step.T + noise)
         error, spread, weight = (jnp.stack(each) for each in zip(*readings, strict=True))
-        return onward, _Filtered(*predicted, error, spread, weight, total)
+        return onward, _Filtered(predicted[0], predicted[1], error, spread, weight, total)
 
     start = (jnp.zeros(model.start.shape[0]), model.start)
     swell = jnp.ones(len(seen)) if swell is None else swell

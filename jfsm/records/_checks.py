@@ -7,11 +7,13 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jfsm.records._defects import clipped, spikes
+from jfsm.records._figures import figure, plus_minus, share
 from jfsm.records._level import Level, level
 from jfsm.records._noise_floor import SHORTEST, SPACINGS, NoiseFloor
+from jfsm.records._phase_plane import PhasePlane, phase_plane
 from jfsm.records._quantisation import quantisation_step
 from jfsm.records._repeats import longest_hold, repetition
+from jfsm.records._trace import Trace
 
 Samples = NDArray[np.float64]
 
@@ -59,8 +61,8 @@ class ChannelSummary:
         Strongest frequency [Hz].
     coverage : float or None
         Share of ten bands of amplitude, from rest to the largest motion, in which the channel spends time.
-    phase_plane : float or None
-        Share of the cells of a grid over the disc of the phase plane, ten across, that the channel enters.
+    phase_plane : PhasePlane or None
+        Where the channel has been against its rate of change; None without a signal.
     """
 
     channel: str
@@ -78,13 +80,11 @@ class ChannelSummary:
     noise_only: bool
     frequency: float | None
     coverage: float | None
-    phase_plane: float | None
+    phase_plane: PhasePlane | None
 
 
 def examine(
-    channel: str,
-    unit: str,
-    raw: Samples,
+    trace: Trace,
     uniform: Samples,
     dt: float,
     floor: NoiseFloor | None,
@@ -94,9 +94,8 @@ def examine(
 
     Parameters
     ----------
-    channel, unit : str
-    raw : (n,) float array
-        Samples as recorded.
+    trace : Trace
+        As recorded.
     uniform : (m,) float array
         The same channel on a uniform clock.
     dt : float
@@ -107,10 +106,10 @@ def examine(
         Samples at which the velocity changes its sign, where friction makes an acceleration jump.
     """
     smooth = None if floor is None or floor.silent else floor.smooth
-    torn = np.zeros(raw.size, dtype=bool) if floor is None else spikes(raw, floor.std)
+    raw = trace.samples
     summary = ChannelSummary(
-        channel=channel,
-        unit=unit,
+        channel=trace.channel,
+        unit=trace.unit,
         minimum=float(raw.min()),
         maximum=float(raw.max()),
         mean=float(raw.mean()),
@@ -119,16 +118,16 @@ def examine(
         noise_error=None if floor is None else floor.std_error,
         level=None if smooth is None else level(uniform, dt),
         quantisation=quantisation_step(raw),
-        clipped=int(clipped(raw).sum()),
-        spikes=int(torn.sum()),
+        clipped=int(trace.clipped.sum()),
+        spikes=int(trace.spikes.sum()),
         noise_only=floor is not None and floor.silent,
         frequency=None if smooth is None else strongest_frequency(smooth, dt),
         coverage=None if smooth is None else amplitude_coverage(smooth),
-        phase_plane=None if smooth is None else phase_plane_coverage(smooth),
+        phase_plane=None if smooth is None else phase_plane(smooth, dt),
     )
     found = [
         *_of_samples(summary, raw),
-        *_of_spikes(summary, torn, turning),
+        *_of_spikes(summary, trace.spikes, turning),
         *_of_level(summary),
         *_of_noise(summary, floor),
         *_of_motion(summary, uniform, dt),
@@ -155,15 +154,6 @@ def amplitude_coverage(y: Samples) -> float:
     radius = np.hypot(motion / max(float(motion.std()), 1e-300), rate / max(float(rate.std()), 1e-300))
     counts, _ = np.histogram(radius, bins=BANDS, range=(0.0, float(radius.max()) or 1.0))
     return float(np.mean(counts > VISITED * y.size))
-
-
-def phase_plane_coverage(y: Samples) -> float:
-    """Share of the cells, ten across, that a motion enters of the disc which its largest position and rate span."""
-    places = np.stack([y - y.mean(), np.gradient(y)])
-    places /= np.maximum(np.abs(places).max(axis=1, keepdims=True), 1e-300)
-    cells, edges, _ = np.histogram2d(*places, bins=BANDS, range=[[-1.0, 1.0], [-1.0, 1.0]])
-    centre = 0.5 * (edges[1:] + edges[:-1])
-    return float(np.mean(cells[np.hypot(*np.meshgrid(centre, centre)) <= 1.0] > 0))
 
 
 def _of_samples(summary: ChannelSummary, raw: Samples) -> Iterator[Finding]:
@@ -212,13 +202,12 @@ def _of_level(summary: ChannelSummary) -> Iterator[Finding]:
         return
     offset, error, drift, drift_error = summary.level or (summary.mean, 0.0, 0.0, 0.0)
     if abs(offset) > max(OFFSET_SHARE * std, LEVEL_ERRORS * error):
-        doubt = f" ± {error:.1g}" if error else ""
-        message = f"Offset of {offset:.3g}{doubt} {unit}, {abs(offset) / std:.1%} of the standard deviation."
+        message = f"Offset of {plus_minus(offset, error)} {unit}, {share(abs(offset) / std)} of the standard deviation."
         yield Finding("info", channel, message)
     if abs(drift) > max(DRIFT_SHARE * std, LEVEL_ERRORS * drift_error):
         message = (
-            f"Drifts by {drift:.3g} ± {drift_error:.1g} {unit} over the record, {abs(drift) / std:.1%} of the standard "
-            f"deviation. Take the trend off if it is the sensor's."
+            f"Drifts by {plus_minus(drift, drift_error)} {unit} over the record, {share(abs(drift) / std)} of the "
+            f"standard deviation. Take the trend off if it is the sensor's."
         )
         yield Finding("info", channel, message)
 
@@ -233,17 +222,20 @@ def _of_noise(summary: ChannelSummary, floor: NoiseFloor | None) -> Iterator[Fin
     if floor.silent:
         yield Finding("info", channel, f"Noise only, {floor.std:.3g} {unit}, or too fast to be told from it.")
         return
-    share = floor.std / summary.std
     at_limit = floor.spacing == SPACINGS[0] and fast_share(floor.smooth) > FAST_SHARE
-    severity = "warning" if share > NOISY_SHARE and not at_limit else "info"
-    size = f"{'at most ' if at_limit else ''}{floor.std:.3g} ± {floor.std_error:.1g} {unit}"
-    yield Finding(severity, channel, f"Noise of {size}, {share:.2%} of the standard deviation.")
+    if floor.std > NOISY_SHARE * summary.std and not at_limit:
+        level = plus_minus(floor.std, floor.std_error)
+        message = f"Noise of {level} {unit}, {share(floor.std / summary.std)} of the standard deviation."
+        yield Finding("warning", channel, message)
     if floor.spacing == SPACINGS[0]:
         if at_limit:
-            message = "The signal reaches the band limit: the noise may be partly signal. Sample faster if you can."
+            message = (
+                f"Much of the signal has fewer than {1 / FAST:.0f} samples a period: part of the noise may be signal. "
+                f"Sample faster if you can."
+            )
             yield Finding("warning", channel, message)
         else:
-            yield Finding("info", channel, "Bends or jumps between samples, which the noise level leaves out.")
+            yield Finding("info", channel, "Bends or jumps within a sample or two; the noise level leaves that out.")
 
 
 def _of_motion(summary: ChannelSummary, uniform: Samples, dt: float) -> Iterator[Finding]:
@@ -251,13 +243,15 @@ def _of_motion(summary: ChannelSummary, uniform: Samples, dt: float) -> Iterator
         return
     channel, per_period = summary.channel, 1.0 / (summary.frequency * dt)
     periods = uniform.size / per_period
-    severity = "warning" if per_period < FEW_PER_PERIOD else "info"
     if periods < FEWEST_PERIODS:
         message = "Strongest below two periods in the record: its frequency cannot be told."
-    else:
-        counts = f"{_figure(periods)} periods of {_figure(per_period)} samples"
-        message = f"Strongest at {summary.frequency:.4g} Hz: {counts}."
-    yield Finding(severity, channel, message)
+        yield Finding("info", channel, message)
+    elif per_period < FEW_PER_PERIOD:
+        message = (
+            f"Strongest at {summary.frequency:.4g} Hz: {figure(periods)} periods of only {figure(per_period)} samples. "
+            f"Sample faster if you can."
+        )
+        yield Finding("warning", channel, message)
     narrow = round(summary.coverage * BANDS) <= NARROW and _is_steady(uniform)
     if narrow and channel.split()[0] != "force":
         message = (
@@ -271,8 +265,3 @@ def _is_steady(y: Samples) -> bool:
     """Whether no quarter moves far more than another, as where a motion dies out, however short its first blow."""
     sizes = [float(quarter.std()) for quarter in np.array_split(y, 4)]
     return max(sizes) < STEADY * min(sizes)
-
-
-def _figure(count: float) -> str:
-    """Three digits, and all that stand before the point."""
-    return f"{count:.0f}" if count >= 100 else f"{count:.3g}"

@@ -8,6 +8,7 @@ import numpy as np
 
 from jfsm.records._checks import ChannelSummary, Finding, strongest_frequency
 from jfsm.records._comparison import Comparison, Reading, compare
+from jfsm.records._figures import plus_minus, share
 
 KINDS = ("displacement", "velocity", "acceleration")
 GAIN, DELAY, OFFSET = 0.025, 0.2, 0.025  # worth a warning: relative; samples; share of the standard deviation
@@ -57,46 +58,48 @@ def of_comparisons(
 
 
 def _of_polarity(pairs: Sequence[Comparison]) -> Iterator[Finding]:
-    inverted = [_Pair(pair.lower, pair.upper, 1.0 if pair.inverted else 0.0, 0.1) for pair in pairs]
-    if any(pair.inverted for pair in pairs):
-        yield from _accuse(
-            inverted,
-            [pair for pair in inverted if pair.excess],
-            lambda _, others: f"Inverted against {others}. Turn its sign.",
-            lambda pair: f"{pair.upper} is inverted against {pair.lower}: turn the sign of one of them.",
-            turns=True,
-        )
+    yield from _of_excess(
+        pairs,
+        [(1.0 if pair.inverted else 0.0, 0.0) for pair in pairs],
+        limit=0.5,
+        blur=0.1,
+        of_one=lambda _, others: f"Inverted against {others}. Turn its sign.",
+        of_two=lambda pair: f"{pair.upper} is inverted against {pair.lower}: turn the sign of one of them.",
+        turns=True,
+    )
 
 
 def _of_gain(pairs: Sequence[Comparison]) -> Iterator[Finding]:
-    seen = [_Pair(p.lower, p.upper, np.log(p.gain), np.hypot(p.gain_error, GAIN_BLUR)) for p in pairs]
-    errors = {(p.lower, p.upper): p.gain_error for p in pairs}
-    wrong = [p for p in seen if abs(p.excess) > max(GAIN, ERRORS * errors[p.lower, p.upper])]
-
     def amount(excess: float) -> str:
         return f"{abs(np.expm1(excess)):.1%} {'more' if excess > 0 else 'less'}"
 
-    yield from _accuse(
-        seen,
-        wrong,
-        lambda excess, others: f"Reads {amount(excess)} than {others} imply. Check its calibration factor and unit.",
-        lambda pair: f"{pair.upper} reads {amount(pair.excess)} than {pair.lower} implies: check both calibrations.",
+    yield from _of_excess(
+        pairs,
+        [(np.log(pair.gain), pair.gain_error) for pair in pairs],
+        limit=GAIN,
+        blur=GAIN_BLUR,
+        of_one=lambda excess, others: (
+            f"Reads {amount(excess)} than {others} imply. Check its calibration factor and unit."
+        ),
+        of_two=lambda pair: (
+            f"{pair.upper} reads {amount(pair.excess)} than {pair.lower} implies: check both calibrations."
+        ),
     )
 
 
 def _of_delay(pairs: Sequence[Comparison], dt: float) -> Iterator[Finding]:
-    seen = [_Pair(p.lower, p.upper, p.delay / dt, np.hypot(p.delay_error / dt, DELAY_BLUR)) for p in pairs]
-    errors = {(p.lower, p.upper): p.delay_error / dt for p in pairs}
-    wrong = [p for p in seen if abs(p.excess) > max(DELAY, ERRORS * errors[p.lower, p.upper])]
-
     def amount(excess: float) -> str:
         return f"{abs(excess):.2f} samples ({abs(excess) * dt:.3g} s) {'late' if excess > 0 else 'early'}"
 
-    yield from _accuse(
-        seen,
-        wrong,
-        lambda excess, others: f"Comes {amount(excess)} against {others}. Shift it, or check its filter.",
-        lambda pair: f"{pair.upper} comes {amount(pair.excess)} against {pair.lower}: check the filters of both.",
+    yield from _of_excess(
+        pairs,
+        [(pair.delay / dt, pair.delay_error / dt) for pair in pairs],
+        limit=DELAY,
+        blur=DELAY_BLUR,
+        of_one=lambda excess, others: f"Comes {amount(excess)} against {others}. Shift it, or check its filter.",
+        of_two=lambda pair: (
+            f"{pair.upper} comes {amount(pair.excess)} against {pair.lower}: check the filters of both."
+        ),
     )
 
 
@@ -110,29 +113,39 @@ def _of_offset(pairs: Sequence[Comparison], summaries: Mapping[str, ChannelSumma
         summary = summaries[channel]
         if abs(pair.offset) > max(OFFSET * summary.std, ERRORS * pair.offset_error):
             message = (
-                f"Offset of {pair.offset:.3g} ± {pair.offset_error:.1g} {summary.unit} that {pair.lower} does not "
-                f"show: {abs(pair.offset) / summary.std:.1%} of the standard deviation. Subtract it."
+                f"Offset of {plus_minus(pair.offset, pair.offset_error)} {summary.unit} that {pair.lower} does not "
+                f"show: {share(abs(pair.offset) / summary.std)} of the standard deviation. Subtract it."
             )
             yield Finding("warning", channel, message)
 
 
-def _accuse(
-    pairs: Sequence[_Pair],
-    wrong: Sequence[_Pair],
+def _of_excess(
+    pairs: Sequence[Comparison],
+    excesses: Sequence[tuple[float, float]],
+    limit: float,
+    blur: float,
     of_one: Callable[[float, str], str],
     of_two: Callable[[_Pair], str],
     turns: bool = False,
 ) -> Iterator[Finding]:
-    """The one channel whose fault explains all pairs; failing that, each pair that disagrees."""
+    """The one channel whose fault explains all pairs; failing that, each pair that disagrees.
+
+    `excesses` are how much the upper channel of each pair exceeds the lower one, and the standard error of that.
+    """
+    seen, wrong = [], []
+    for pair, (excess, error) in zip(pairs, excesses, strict=True):
+        seen.append(_Pair(pair.lower, pair.upper, excess, float(np.hypot(error, blur))))
+        if abs(excess) > max(limit, ERRORS * error):
+            wrong.append(seen[-1])
     if not wrong:
         return
-    named = _culprit(pairs, turns)
+    named = _culprit(seen, turns)
     if named is None:
         for pair in wrong:
             yield Finding("warning", f"{pair.lower}, {pair.upper}", of_two(pair))
         return
     channel, excess = named
-    others = " and ".join(dict.fromkeys(c for pair in pairs for c in pair[:2] if c != channel))
+    others = " and ".join(dict.fromkeys(c for pair in seen for c in pair[:2] if c != channel))
     yield Finding("warning", channel, of_one(excess, others))
 
 

@@ -2,16 +2,18 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from jfsm.records._checks import ChannelSummary, Finding, examine
 from jfsm.records._coherence import Coherence, coherence
 from jfsm.records._comparison import Comparison, Reading
 from jfsm.records._consistency import KINDS, comparisons, of_comparisons
-from jfsm.records._defects import clipped, spikes
+from jfsm.records._figures import plus_minus
 from jfsm.records._noise_floor import SHORTEST, noise_floor
 from jfsm.records._noise_spectrum import NoiseSpectrum, noise_spectrum
 from jfsm.records._periods import Periods, average
@@ -19,6 +21,8 @@ from jfsm.records._plain import plain
 from jfsm.records._polarity import is_inverted
 from jfsm.records._repeats import copies
 from jfsm.records._silence import is_silent
+from jfsm.records._spectrum import Spectrum, spectrum
+from jfsm.records._trace import Trace
 
 if TYPE_CHECKING:
     from jfsm.records._record import Record
@@ -47,12 +51,22 @@ class Inspection:
         (severity, channel, message); severity is "info" or "warning".
     comparisons : tuple of Comparison
         Displacement, velocity and acceleration of each point against one another.
+    spectra : tuple of Spectrum
+        Power of each channel over frequency.
     noise : tuple of NoiseSpectrum
         Noise over frequency, of the channels that leave room to see it.
     coherence : tuple of Coherence
         Of each response with the driving channels.
     periods : Periods or None
         Averages over periods, of a record that repeats itself.
+    drives : tuple of str
+        Channels that drive, silent forces left out; none in a free decay.
+    gaps : tuple of (start, end)
+        Instants [s] between which samples are missing.
+    time : (n,) float array
+        Instants of the samples [s].
+    traces : tuple of Trace
+        The samples of each channel, and which of them are clipped or spikes.
     """
 
     name: str | None
@@ -61,40 +75,47 @@ class Inspection:
     sample_rate: float
     channels: tuple[ChannelSummary, ...]
     findings: tuple[Finding, ...]
+    time: NDArray[np.float64]
+    traces: tuple[Trace, ...]
+    drives: tuple[str, ...] = ()
+    gaps: tuple[tuple[float, float], ...] = ()
     comparisons: tuple[Comparison, ...] = ()
+    spectra: tuple[Spectrum, ...] = ()
     noise: tuple[NoiseSpectrum, ...] = ()
     coherence: tuple[Coherence, ...] = ()
     periods: Periods | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain numbers, text, lists and dictionaries, as JSON has them."""
-        return plain(self)
+        """Plain numbers, text, lists and dictionaries, as JSON has them; the samples themselves are left out."""
+        return {field: plain(value) for field, value in vars(self).items() if field not in ("time", "traces")}
 
     def print(self) -> None:
-        """Show the page in the terminal."""
-        from rich.console import Console  # only a terminal needs it
-        from rich.table import Table
+        """Show channels and findings in the terminal."""
+        from jfsm.reporting import print_inspection
 
-        extent = f"{self.samples} samples over {self.duration:.6g} s at {self.sample_rate:.6g} Hz"
-        table = Table(title=f"{self.name or 'Record'}: {extent}", title_justify="left")
-        for heading in ("channel", "unit", "minimum", "maximum", "mean", "s.d.", "noise", "±"):
-            table.add_column(heading, justify="left" if heading in ("channel", "unit") else "right", no_wrap=True)
-        for row in self.channels:
-            figures = (row.minimum, row.maximum, row.mean, row.std, row.noise)
-            cells = ("–" if figure is None else f"{figure:.4g}" for figure in figures)
-            error = "–" if row.noise_error is None else f"{row.noise_error:.1g}"
-            table.add_row(row.channel, row.unit, *cells, error)
-        console = Console()
-        console.print(table)
-        for severity, channel, message in self.findings:
-            style = "bold yellow" if severity == "warning" else "dim"
-            console.print(f"{severity:7} {channel}: {message}", style=style, markup=False, highlight=False)
+        print_inspection(self.to_dict())
+
+    def report(self, path: str | Path) -> None:
+        """Write a self-contained HTML page: findings, channels over time, noise, spectra and what else there is to see.
+
+        The file appears under its name only when it is complete.
+
+        Raises
+        ------
+        OSError
+            If `path` is not a file in a folder that can be written to; what stood there is still there.
+        """
+        from jfsm.reporting import render_inspection, write_text_atomically
+
+        curves = {"time": self.time, "channels": {trace.channel: vars(trace) for trace in self.traces}}
+        write_text_atomically(path, render_inspection({**self.to_dict(), "curves": curves}))
 
 
 def inspect(record: "Record") -> Inspection:
     """All that a record shows by itself, with what is wrong first."""
     findings = [Finding("info", "record", note) for note in record.notes]
-    findings.extend(_of_the_clock(record))
+    gaps = tuple(_gaps(record.time))
+    findings.extend(_of_the_clock(record, gaps))
     uniform = record
     try:
         dt = record.dt
@@ -102,22 +123,26 @@ def inspect(record: "Record") -> Inspection:
         uniform = record.resample(1.0 / float(np.median(np.diff(record.time))))
         dt = uniform.dt
 
+    traces: list[Trace] = []
     summaries: dict[str, ChannelSummary] = {}
     readings: dict[str, Reading] = {}
-    spectra = []
+    spectra, noise = [], []
     even = _every_channel(uniform)
     for channel, (unit, samples) in _every_channel(record).items():
         y = even[channel][1]
         floor = noise_floor(y, dt) if y.size >= SHORTEST else None
+        traces.append(Trace.of(channel, unit, samples, floor))
         turning = _turning(record, channel) if channel.startswith("acceleration") else None
-        summaries[channel], found = examine(channel, unit, samples, y, dt, floor, turning)
+        summaries[channel], found = examine(traces[-1], y, dt, floor, turning)
         findings.extend(found)
         if floor is None or np.ptp(y) == 0:
             continue
-        readings[channel] = Reading(channel, y, floor.std, clipped(y) | spikes(y, floor.std))
+        lost = (traces[-1] if uniform is record else Trace.of(channel, unit, y, floor)).lost
+        readings[channel] = Reading(channel, y, floor.std, lost)
+        spectra.append(spectrum(channel, y, dt))
         if floor.std > 0:
-            spectra.append(noise_spectrum(channel, y, floor))
-    noise = tuple(spectrum for spectrum in spectra if spectrum is not None)
+            noise.append(noise_spectrum(channel, y, floor))
+    noise = tuple(one for one in noise if one is not None)
     findings.extend(_of_spectra(noise, summaries))
     findings.extend(_of_copies(readings))
 
@@ -131,18 +156,23 @@ def inspect(record: "Record") -> Inspection:
     driving, answering = ({name: one.samples for name, one in side.items()} for side in (drives, responses))
     periods = average(driving, answering, dt)
     if periods is not None:
-        findings.extend(_of_periods(periods, summaries))
+        findings.extend(_of_periods(periods, uniform, summaries))
     return Inspection(
-        record.name,
-        len(record),
-        record.duration,
-        (len(record) - 1) / record.duration,
-        tuple(summaries.values()),
-        tuple(sorted(findings, key=lambda finding: finding.severity, reverse=True)),
-        pairs,
-        noise,
-        coherent,
-        periods,
+        name=record.name,
+        samples=len(record),
+        duration=record.duration,
+        sample_rate=(len(record) - 1) / record.duration,
+        channels=tuple(summaries.values()),
+        findings=_sorted(findings, list(summaries)),
+        time=record.time,
+        traces=tuple(traces),
+        drives=tuple(drives),
+        gaps=gaps,
+        comparisons=pairs,
+        spectra=tuple(one for one in spectra if one is not None),
+        noise=noise,
+        coherence=coherent,
+        periods=periods,
     )
 
 
@@ -154,19 +184,25 @@ def _every_channel(record: "Record") -> dict[str, tuple[str, np.ndarray]]:
     return shown
 
 
-def _of_the_clock(record: "Record") -> Iterator[Finding]:
+def _gaps(time: NDArray[np.float64]) -> Iterator[tuple[float, float]]:
+    """Instants between which samples are missing."""
+    steps = np.diff(time)
+    for i in np.flatnonzero(steps > GAP * np.median(steps)):
+        yield float(time[i]), float(time[i + 1])
+
+
+def _of_the_clock(record: "Record", gaps: tuple[tuple[float, float], ...]) -> Iterator[Finding]:
     """Uneven steps and gaps."""
-    steps = np.diff(record.time)
     try:
         _ = record.dt
     except ValueError as error:
         yield Finding("warning", "record", str(error))
-    missing = np.flatnonzero(steps > GAP * np.median(steps))
-    if missing.size:
-        longest = int(np.argmax(steps))
-        long = steps[longest] > LONG_GAP * np.median(steps)
+    if gaps:
+        start, end = max(gaps, key=lambda gap: gap[1] - gap[0])
+        long = end - start > LONG_GAP * np.median(np.diff(record.time))
+        count = "1 gap" if len(gaps) == 1 else f"{len(gaps)} gaps"
         message = (
-            f"{missing.size} gaps, of at most {steps[longest]:.4g} s (after t = {record.time[longest]:.6g} s). "
+            f"{count}, of at most {end - start:.4g} s (after t = {start:.6g} s). "
             f"{'Do not fit across it: cut the record there.' if long else 'Resampling bridges them.'}"
         )
         yield Finding("warning" if long else "info", "record", message)
@@ -296,29 +332,44 @@ def _of_coherence(found: tuple[Coherence, ...]) -> Iterator[Finding]:
 
 
 def _of_spectra(spectra: tuple[NoiseSpectrum, ...], summaries: Mapping[str, ChannelSummary]) -> Iterator[Finding]:
-    for spectrum in spectra:
-        if spectrum.coloured:
-            (first, *_, last), (low, *_, high) = spectrum.bands()
+    for one in spectra:
+        if one.coloured:
+            (first, *_, last), (low, *_, high) = one.bands()
             message = (
-                f"Noise is not white: {np.sqrt(low):.3g} {summaries[spectrum.channel].unit}/√Hz at {first:.3g} Hz, "
-                f"{np.sqrt(high):.3g} at {last:.3g} Hz. The noise level holds above the signal only."
+                f"Noise is not white: {np.sqrt(low):.3g} {summaries[one.channel].unit}/√Hz at {first:.3g} Hz, "
+                f"{np.sqrt(high):.3g} at {last:.3g} Hz. The noise level was read there; within the signal's band "
+                f"it may differ."
             )
-            yield Finding("info", spectrum.channel, message)
+            yield Finding("info", one.channel, message)
 
 
-def _of_periods(periods: Periods, summaries: Mapping[str, ChannelSummary]) -> Iterator[Finding]:
-    left = f"; {periods.transient} before them had not settled. Leave these out" if periods.transient else ""
-    message = f"Periodic: {periods.count} periods of {periods.samples} samples ({periods.seconds:.4g} s) agree{left}."
+def _of_periods(periods: Periods, record: "Record", summaries: Mapping[str, ChannelSummary]) -> Iterator[Finding]:
+    message = f"Periodic: {periods.count} periods of {periods.samples} samples ({periods.seconds:.4g} s) agree."
+    if periods.transient:
+        settled = record.time[len(record) - periods.count * periods.samples]
+        message += f" Before t = {settled:.6g} s the motion had not settled: leave that part out."
     yield Finding("info", "record", message)
     for one in periods.channels:
         unit, floor = summaries[one.channel].unit, summaries[one.channel].noise
-        message = f"Changes by {one.noise:.3g} ± {one.noise_error:.1g} {unit} from period to period."
-        if floor is not None and one.noise > DISTURBED * floor:
-            message += (
-                f" That is {one.noise / floor:.1f} times its noise above the signal: count on it within the band."
+        if one.noise == 0:
+            yield Finding("info", one.channel, "The same in every period to the last digit: computed, not measured.")
+        elif floor is not None and one.noise > DISTURBED * floor:
+            message = (
+                f"Changes by {plus_minus(one.noise, one.noise_error)} {unit} from period to period, "
+                f"{one.noise / floor:.1f} times its noise above the signal: count on this much noise within the band."
             )
-        yield Finding("info", one.channel, message)
-        for name, share in (("even", one.even), ("odd", one.odd)):
-            if share is not None:
-                size = f"{20 * np.log10(share):.0f} dB under the excited lines" if share else "none beyond noise"
-                yield Finding("info", one.channel, f"Distortion by {name} nonlinearities: {size}.")
+            yield Finding("info", one.channel, message)
+        for name, size in (("even", one.even), ("odd", one.odd)):
+            if size:
+                message = f"Distortion by {name} nonlinearities, {-20 * np.log10(size):.0f} dB under the excited lines."
+                yield Finding("info", one.channel, message)
+
+
+def _sorted(findings: list[Finding], channels: list[str]) -> tuple[Finding, ...]:
+    """Warnings first, then by channel: those on the whole record before those on its channels in their order."""
+
+    def place(finding: Finding) -> tuple[bool, int]:
+        first = finding.channel.split(",")[0]
+        return finding.severity != "warning", 1 + channels.index(first) if first in channels else 0
+
+    return tuple(sorted(findings, key=place))

@@ -60,5 +60,4 @@ def noise_spectrum(channel: str, y: NDArray[np.float64], floor: NoiseFloor) -> N
         return None
     # The median of the squared modulus of a complex normal number is its mean times ln 2.
     power = np.median(np.abs(pieces.spectra(y - floor.smooth)) ** 2, axis=0) / np.log(2.0)
-    density = 2.0 * floor.dt * power / pieces.noise(1.0)
-    return NoiseSpectrum(channel, frequency[free], density[free])
+    return NoiseSpectrum(channel, frequency[free], pieces.density(power)[free])

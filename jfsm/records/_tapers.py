@@ -89,3 +89,7 @@ class Pieces:
             case _:
                 gain = w2 @ w2 + omega2 * (4 * (w1 @ w1) - 2 * (w2 @ w)) + omega2**2 * (w @ w)
         return (std * self.dt) ** 2 * gain
+
+    def density(self, power: Samples) -> Samples:
+        """(frequencies,) one-sided power spectral density [unit²/Hz] of a channel whose spectra have this power."""
+        return 2.0 * self.dt * power / self.noise(1.0)

@@ -1,10 +1,12 @@
-"""What is shown: terminal text, pictures and a page, from plain dictionaries such as ``Diagnosis.to_json`` writes."""
+"""What is shown: terminal text, pictures and pages, from plain dictionaries such as ``Diagnosis.to_json`` writes."""
 
 from ._files import write_text_atomically as write_text_atomically
+from ._inspection_page import render_inspection as render_inspection
+from ._inspection_pictures import inspection_pictures as inspection_pictures
 from ._page import render_page as render_page
-from ._pictures import Picture as Picture
 from ._pictures import pictures as pictures
 from ._pictures import plot_diagnosis as plot_diagnosis
+from ._sketch import Picture as Picture
 from ._text import diagnosis_text as diagnosis_text
 from ._text import inspection_text as inspection_text
 from ._text import print_diagnosis as print_diagnosis

@@ -2,13 +2,19 @@
 
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
+from numpy.typing import NDArray
+
+from jfsm.reporting._quantities import power_of_ten
 
 # Colours that everyone can tell apart (Okabe, Ito). On a page each becomes the style variable of the same name.
 INK, MUTED, GRID, PAPER = "#1c2733", "#64717f", "#dde3e9", "#fefefe"
@@ -103,6 +109,37 @@ def label(axes: Axes, x: str, y: str) -> None:
     axes.set_ylabel(y)
 
 
+def log_axis(axes: Axes, which: Literal["x", "y"]) -> None:
+    """Make an axis logarithmic, with powers of ten in the page's own font."""
+    axes.set(**{f"{which}scale": "log"})
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axis.set_major_formatter(lambda value, _: power_of_ten(value))
+    axis.set_minor_formatter(lambda value, _: "")
+
+
+def key_on_top(figure: FigureBase, panels: Iterable[Axes]) -> None:
+    """One legend for all panels, above them."""
+    entries = {}
+    for axes in panels:
+        entries |= {str(text): handle for handle, text in zip(*axes.get_legend_handles_labels(), strict=True)}
+    figure.legend(
+        list(entries.values()), list(entries), loc="outside upper right", ncols=len(entries), handlelength=1.6
+    )
+
+
 def key_above(axes: Axes, columns: int) -> None:
     """Legend in one line above the axes, flush right, where no data are."""
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.1, handlelength=1.6)
+
+
+def dots(axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], colour: str, text: str) -> None:
+    """Points, and an entry in the legend; with a marker each, a page would be ten times as large."""
+    points = np.column_stack([x, y])
+    points = points[np.isfinite(points).all(axis=1)]
+    # One path of dots: strokes hardly long, with round ends.
+    half = np.array([np.abs(points[:, 0]).max(initial=0.0) / 2000.0, 0.0])
+    ends = np.stack([points - half, points + half], axis=1).reshape(-1, 2)
+    strokes = Path(ends, np.tile([Path.MOVETO, Path.LINETO], len(points)))
+    strokes.should_simplify = False
+    axes.add_patch(PathPatch(strokes, fill=False, edgecolor=colour, linewidth=2.0, capstyle="round", alpha=0.6))
+    axes.plot([], [], ".", color=colour, alpha=0.6, label=text)

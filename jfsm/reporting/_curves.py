@@ -25,11 +25,15 @@ def peak(*curves: Curve) -> float:
     return max((float(np.nanmax(np.abs(c))) for c in curves if np.isfinite(c).any()), default=0.0)
 
 
-def envelope(x: Curve, y: Curve, columns: int = 1200) -> tuple[Curve, Curve]:
-    """At most two points a column, the lowest and the highest: looks the same as all points in a line drawing."""
+def envelope(x: Curve, y: Curve, columns: int = 1200, log: bool = False) -> tuple[Curve, Curve]:
+    """At most two points a column, the lowest and the highest: looks the same as all points in a line drawing.
+
+    Columns are equally wide; with `log`, on a logarithmic axis of which `x` is a uniform grid from near 0.
+    """
     if x.size <= 2 * columns:
         return x, y
-    edges = np.linspace(0, x.size, columns + 1).astype(int)
+    spaced = np.geomspace(1, x.size, columns) - 1 if log else np.linspace(0, x.size, columns + 1)
+    edges = np.append(np.unique(spaced.astype(int)[:-1]), x.size)
     filled = np.where(np.isfinite(y), y, 0.0)
     kept = [
         first + at

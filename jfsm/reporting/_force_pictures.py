@@ -6,10 +6,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import FigureBase
-from matplotlib.patches import PathPatch
-from matplotlib.path import Path
 
-from jfsm.reporting._canvas import AFTER, FLOOR, INK, PAPER, key_above, label
+from jfsm.reporting._canvas import AFTER, FLOOR, INK, PAPER, dots, key_above, label
 from jfsm.reporting._curves import Curve, curve, peak
 from jfsm.reporting._quantities import Scale, quantity, scale_for
 
@@ -40,16 +38,8 @@ def _draw_points(axes: Axes, along: Curve, force: Curve, across: Curve, other: s
     """Where the other axis is near 0 the points are strong: these are the ones to compare with the line."""
     step = max(1, -(-force.size // MOST_POINTS))
     near = np.abs(across) <= NEAR_ZERO * peak(across)
-    # One path of dots, strokes hardly long with round ends: with a marker each, a page would be ten times as large.
-    half = np.array([peak(along) / 2000.0, 0.0])
     for chosen, colour, text in ((~near, FLOOR, "all"), (near, INK, f"{other} near 0")):
-        points = np.column_stack([along[chosen], force[chosen]])[::step]
-        points = points[np.isfinite(points).all(axis=1)]
-        ends = np.stack([points - half, points + half], axis=1).reshape(-1, 2)
-        strokes = Path(ends, np.tile([Path.MOVETO, Path.LINETO], len(points)))
-        strokes.should_simplify = False
-        axes.add_patch(PathPatch(strokes, fill=False, edgecolor=colour, linewidth=2.0, capstyle="round", alpha=0.6))
-        axes.plot([], [], ".", color=colour, alpha=0.6, label=text)
+        dots(axes, along[chosen][::step], force[chosen][::step], colour, text)
     axes.autoscale_view()
 
 

@@ -1,19 +1,12 @@
 """The page of a diagnosis: one HTML file that needs nothing beside it."""
 
 from collections.abc import Mapping
-from functools import cache
-from importlib.resources import files
 from typing import Any
 
-from jinja2 import Environment, StrictUndefined, Template
-from markupsafe import Markup
-
-from jfsm.reporting._canvas import svg
 from jfsm.reporting._pictures import pictures
 from jfsm.reporting._quantities import number
 from jfsm.reporting._summary import key_answers
 from jfsm.reporting._tables import (
-    Table,
     candidates_table,
     channels_table,
     detectable_table,
@@ -22,7 +15,8 @@ from jfsm.reporting._tables import (
     refitted_table,
     rivals_table,
 )
-from jfsm.reporting._wording import checked_verdict
+from jfsm.reporting._template import inline, template
+from jfsm.reporting._wording import checked_verdict, extent
 
 FIRST_CANDIDATES = 10
 
@@ -53,24 +47,17 @@ def render_page(d: Mapping[str, Any]) -> str:
     record = d.get("record") or {}
     verdict = checked_verdict(d)
     headline, _, remark = (d.get("sentence") or verdict.meaning).partition(". ")
-    return _template().render(
+    return template("diagnosis.html.j2").render(
         version=d.get("jfsm"),
-        verdict=verdict,
+        badge=verdict.label,
+        tone=verdict.tone,
         headline=headline,
         remark=remark,
         advice=d.get("advice"),
         title=record.get("name") or "a measured record",
-        record_line=_record_line(record),
+        record_line=" · ".join(extent(record)),
         answers=key_answers(d),
-        pictures={
-            picture.name: {
-                "title": picture.title,
-                "caption": picture.caption,
-                "alt": picture.alt,
-                "svg": _inline(picture),
-            }
-            for picture in pictures(d)
-        },
+        pictures=inline(pictures(d)),
         statements=[finding["sentence"] for finding in findings if finding.get("sentence")],
         findings=findings_table(findings),
         rivals=rivals_table(findings),
@@ -87,21 +74,6 @@ def render_page(d: Mapping[str, Any]) -> str:
     )
 
 
-def _inline(picture: Any) -> Markup:
-    # Safe to take as it is: matplotlib escapes the texts that it writes into an SVG.
-    return Markup(svg(picture.figure, picture.name))
-
-
-def _record_line(record: Mapping[str, Any]) -> str:
-    samples, rate, duration = (record.get(key) for key in ("samples", "sample_rate", "duration"))
-    parts = (
-        f"{samples} samples" if samples is not None else "",
-        f"{number(rate, 4)} Hz" if rate is not None else "",
-        f"{number(duration, 4)} s" if duration is not None else "",
-    )
-    return " · ".join(filter(None, parts))
-
-
 def _additions(d: Mapping[str, Any]) -> list[tuple[str, bool]]:
     """Lines of the extended structure, and whether the model as given has them in the same words."""
     given = set(d.get("model") or ())
@@ -115,22 +87,3 @@ def _timing(timing: Mapping[str, Any]) -> str:
         f"{programs} compiled programs" if programs is not None else "",
     )
     return ", ".join(filter(None, parts))
-
-
-@cache
-def _template() -> Template:
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.globals["is_words"] = _is_words
-    environment.filters["unbroken"] = _unbroken
-    source = files("jfsm.reporting").joinpath("page.html.j2").read_text(encoding="utf-8")
-    return environment.from_string(source)
-
-
-def _unbroken(detail: str) -> str:
-    """ "displacement 1: 6.83 → 0.298 mm" with its figures on one line."""
-    head, colon, figures = detail.rpartition(": ")
-    return head + colon + figures.replace(" ", "\N{NO-BREAK SPACE}") if colon else detail
-
-
-def _is_words(table: Table, column: int) -> bool:
-    return column in table.text_columns

@@ -1,52 +1,16 @@
 """The pictures of a diagnosis, each made only if the diagnosis holds what it shows."""
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from typing import Any
 
-from matplotlib.figure import Figure, FigureBase
+from matplotlib.figure import Figure
 
 from jfsm.reporting._canvas import house_style
 from jfsm.reporting._force_pictures import describe_map, describe_residual, draw_map, draw_residual
 from jfsm.reporting._record_picture import describe_record, draw_record, drawn_channels
 from jfsm.reporting._score_pictures import describe_gain, describe_ranking, draw_gain, draw_ranking, ranked_size
+from jfsm.reporting._sketch import WIDTH, Picture, Sketch, drawn
 from jfsm.reporting._wording import checked_verdict
-
-WIDTH = 10.0  # inches
-
-
-@dataclass(frozen=True)
-class Sketch:
-    """A picture to be drawn: what it is called and says, its height in inches, and how it is drawn."""
-
-    name: str
-    title: str
-    caption: str
-    alt: str
-    height: float
-    draw: Callable[[FigureBase], None]
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A drawn picture.
-
-    Attributes
-    ----------
-    name : str
-        "record", "residual", "map", "gain" or "ranking".
-    title, caption : str
-    alt : str
-        The picture in words, numbers included.
-    figure : matplotlib.figure.Figure
-        Not registered with pyplot: ``figure.savefig(path)`` writes it.
-    """
-
-    name: str
-    title: str
-    caption: str
-    alt: str
-    figure: Figure
 
 
 def pictures(d: Mapping[str, Any]) -> tuple[Picture, ...]:
@@ -62,13 +26,7 @@ def pictures(d: Mapping[str, Any]) -> tuple[Picture, ...]:
     ValueError
         If `d` is not the dictionary of a diagnosis.
     """
-    made = []
-    for sketch in _sketches(d):
-        with house_style():
-            figure = Figure(figsize=(WIDTH, sketch.height), layout="constrained")
-            sketch.draw(figure)
-        made.append(Picture(sketch.name, sketch.title, sketch.caption, sketch.alt, figure))
-    return tuple(made)
+    return drawn(_sketches(d))
 
 
 def plot_diagnosis(d: Mapping[str, Any]) -> Figure:

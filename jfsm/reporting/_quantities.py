@@ -56,6 +56,34 @@ def quantity(value: float | None, unit: str | None, digits: int = 3) -> str:
     return f"{number(value / scale.factor, digits)} {scale.unit}".rstrip()
 
 
+def power_of_ten(value: float) -> str:
+    """ "0.1", "10", "10⁻⁵" for a power of ten; empty for what is none."""
+    power = round(math.log10(value)) if value > 0 else 0
+    if not math.isclose(value, 10.0**power, rel_tol=1e-6):
+        return ""
+    return f"{10.0**power:g}" if -2 <= power <= 3 else f"10{str(power).translate(SUPERSCRIPTS)}"
+
+
+def with_error(value: float | None, error: float | None, unit: str | None) -> str:
+    """A quantity with its standard error, cut where the error begins: "5.1 ± 0.9 mV"."""
+    if value is None or not error or not math.isfinite(error):
+        return quantity(value, unit)
+    scale = scale_for(value, unit)
+    value, error = value / scale.factor, error / scale.factor
+    decimals = max(-math.floor(math.log10(error)), 0)
+    if decimals > 6:
+        text = f"{number(value)} ± {number(error, 1)}"
+    else:
+        text = f"{value:.{decimals}f} ± {error:.{decimals}f}".replace("-", "−")
+    return f"{text} {scale.unit}".rstrip()
+
+
+def rate_unit(unit: str | None) -> str:
+    """Unit of the rate of change: m/s of m, m/s² of m/s."""
+    unit = unit or "1"
+    return unit + "²" if unit.endswith("/s") else f"{unit}/s"
+
+
 def interval(low: float | None, high: float | None, unit: str | None, like: float | None = None) -> str:
     """ "[9.8, 10.2]" with the prefix and the decimals that `quantity` has for the value `like`; empty if unknown."""
     if low is None or high is None:

@@ -150,24 +150,6 @@ def detectable_table(detectable: Mapping[str, Dictionary]) -> Table:
     return Table("What this record would have shown", ("cause", "parameter", "from"), rows, _words(0, 1))
 
 
-def inspection_table(channels: Sequence[Dictionary]) -> Table:
-    """Figures of each channel of an inspected record."""
-    figures = ("minimum", "maximum", "mean", "std", "noise")
-    rows = []
-    for channel in channels:
-        values = [channel.get(figure) for figure in figures]
-        factor, unit = scale_for(
-            max((abs(value) for value in values if value is not None), default=None), channel.get("unit")
-        )
-        cells = [number(None if value is None else value / factor) for value in values]
-        if channel.get("noise_error") is not None:
-            cells[-1] += f" ± {number(channel['noise_error'] / factor, 1)}"
-        frequency = quantity(channel.get("frequency"), "Hz")
-        rows.append((channel["channel"], unit or ABSENT, *cells, frequency))
-    headings = ("channel", "unit", "minimum", "maximum", "mean", "s.d.", "noise", "strongest at")
-    return Table("Channels", headings, tuple(rows), _words(0, 1))
-
-
 def _estimate_cells(estimate: Dictionary) -> tuple[str, str]:
     value, low, high, unit = (estimate.get(key) for key in ("value", "low", "high", "unit"))
     return quantity(value, unit, digits_for(value, low, high)), interval(low, high, unit, value)

@@ -1,6 +1,7 @@
 """Terminal text of a diagnosis and of an inspection."""
 
 import io
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -11,25 +12,30 @@ from rich.panel import Panel
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from jfsm.reporting._quantities import number
+from jfsm.reporting._inspection_tables import consistency_table, inspected_channels_table, periods_table
 from jfsm.reporting._summary import key_answers
 from jfsm.reporting._tables import (
     Table,
     candidates_table,
     findings_table,
     gain_table,
-    inspection_table,
     refitted_table,
     rivals_table,
 )
-from jfsm.reporting._wording import checked_verdict
+from jfsm.reporting._wording import checked_verdict, extent
 
 LONGEST_WORD = 16
 """Characters of a name's word that are not cut to make room for a number."""
+WORD = re.compile(r"\S+(?: \d+$)?")
+"""A word of a name; the number of a channel stays with it."""
 TONES = {"good": "green", "change": "cyan", "open": "yellow"}
 MOST_CANDIDATES = 8
 WIDE = 100
 """Characters in a line from which a candidate's errors and the reason against it are shown; the page has them too."""
+WIDER = 115
+"""The same for some figures of an inspection."""
+FIGURES = ("channel", "unit", "minimum", "maximum", "s.d.", "noise ± error")
+AGREEMENT = ("channel", "against", "gain", "late by [samples]")
 ESSENTIAL = ("cause", "place", "evidence [nats]", "explains", "probability")
 
 
@@ -54,7 +60,8 @@ def print_diagnosis(d: Mapping[str, Any], console: Console | None = None) -> Non
 
 def print_inspection(d: Mapping[str, Any], console: Console | None = None) -> None:
     """Show in the terminal what ``Inspection.to_dict`` returns: channels, and what is odd about them."""
-    (console or Console()).print(_inspection(d))
+    console = console or Console()
+    console.print(_inspection(d, console.width))
 
 
 def diagnosis_text(d: Mapping[str, Any], width: int = 100) -> str:
@@ -64,7 +71,7 @@ def diagnosis_text(d: Mapping[str, Any], width: int = 100) -> str:
 
 def inspection_text(d: Mapping[str, Any], width: int = 100) -> str:
     """The same as `print_inspection` shows, as plain text in lines of `width` characters."""
-    return _plain(_inspection(d), width)
+    return _plain(_inspection(d, width), width)
 
 
 def _plain(renderable: RenderableType, width: int) -> str:
@@ -107,19 +114,21 @@ def _answers(d: Mapping[str, Any]) -> RenderableType:
     return Padding(grid, (0, 0, 1, 3))
 
 
-def _inspection(d: Mapping[str, Any]) -> Group:
-    figures = [
-        f"{d['samples']} samples" if d.get("samples") is not None else "",
-        f"{number(d['duration'], 4)} s" if d.get("duration") is not None else "",
-        f"{number(d['sample_rate'], 5)} Hz" if d.get("sample_rate") is not None else "",
-    ]
-    head = Text.assemble((d.get("name") or "Record", "bold"), ("  " + ", ".join(filter(None, figures)), "dim"))
-    findings = d.get("findings") or ()
+def _inspection(d: Mapping[str, Any], width: int) -> Group:
+    head = Text.assemble((d.get("name") or "Record", "bold"), ("  " + ", ".join(extent(d)), "dim"))
+    channels, findings = d.get("channels") or (), d.get("findings") or ()
+    figures = inspected_channels_table(channels)
+    consistency = consistency_table(d.get("comparisons") or (), channels, d.get("sample_rate"))
+    tables = (
+        figures if width >= WIDER else figures.only(*FIGURES),
+        consistency if width >= WIDER else consistency.only(*AGREEMENT),
+        periods_table(d.get("periods") or {}, channels),
+    )
     remarks = [f"{found['channel']}: {found['message']}" for found in findings]
     styles = ["yellow" if found["severity"] == "warning" else "" for found in findings]
     return Group(
         head,
-        *(_rich_table(table) for table in (inspection_table(d.get("channels") or ()),) if table.rows),
+        *(_rich_table(table) for table in tables if table.rows),
         *(_bullets("Remarks", remarks, styles) or [Text("Nothing odd was found.")]),
     )
 
@@ -128,7 +137,8 @@ def _rich_table(table: Table) -> RenderableType:
     # Cells are Text: brackets in a name are not markup.
     shown = RichTable(title=Text(table.title, style="bold"), title_justify="left", box=SIMPLE_HEAD)
     for column, heading in enumerate(table.headings):
-        words = " ".join(row[column] for row in table.rows).split() if column in table.text_columns else []
+        cells = [row[column] for row in table.rows] if column in table.text_columns else []
+        words = [word for cell in cells for word in WORD.findall(cell)]
         shown.add_column(
             Text(heading),
             justify="left" if column in table.text_columns else "right",

@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from jfsm.reporting._quantities import number
+
 
 class Verdict(NamedTuple):
     """A verdict as a reader meets it; `tone` is the class of its colours."""
@@ -78,3 +80,25 @@ def place_name(at: Sequence[Any] | None) -> str:
 def capitalised(text: str) -> str:
     """First letter large, the others as they are: "van der Pol" has its own."""
     return text[:1].upper() + text[1:]
+
+
+def extent(record: Mapping[str, Any]) -> tuple[str, ...]:
+    """How long a record is: samples, seconds and samples per second, as far as they are known."""
+    samples, duration, rate = (record.get(key) for key in ("samples", "duration", "sample_rate"))
+    parts = (
+        f"{samples} samples" if samples is not None else "",
+        f"{number(duration, 4)} s" if duration is not None else "",
+        f"{rate:.6g} Hz" if rate is not None else "",
+    )
+    return tuple(filter(None, parts))
+
+
+def listed(names: Sequence[str]) -> str:
+    """ "a", "a and b", "a, b and c"."""
+    *others, last = names
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+def counted(count: int, word: str) -> str:
+    """ "No gaps", "1 gap", "2 gaps"."""
+    return f"{count or 'No'} {word}{'' if count == 1 else 's'}"
