@@ -30,8 +30,8 @@ _FINEST, _OVERSAMPLED = 2, 3
 _LEAST_NOISE = 1e-4
 _FULL_BAND = 1e-3
 """Noise of a force whose signal fills its band, as a share of its size at most: nothing in it tells."""
-_SMOOTHER = (1, 2)
-"""Derivatives that the random force may have instead of none."""
+_SMOOTHNESS = (0, 2)
+"""Derivatives that the random force may have."""
 _CYCLES = (1.0, 4.0)
 """Cycles of the motion over which the random force may swell or fade."""
 _LEAST_SWELL = 1e-4
@@ -72,7 +72,7 @@ class Motion:
     @property
     def std(self) -> np.ndarray:
         """Standard error (n, dof, 3) of displacement, velocity and acceleration."""
-        return np.sqrt(np.diagonal(self.covariance, axis1=2, axis2=3))
+        return np.sqrt(np.maximum(np.diagonal(self.covariance, axis1=2, axis2=3), 0.0))
 
 
 def estimate_motion(record: Record, model: Structure | None = None) -> Motion:
@@ -99,8 +99,8 @@ def estimate_motion(record: Record, model: Structure | None = None) -> Motion:
 
     Notes
     -----
-    The random force is a process of Matérn's family with ν = 1/2, 3/2 or 5/2, whichever makes the record most probable:
-    the roughest follows the jumps that dry friction makes, and leaves a wider error band elsewhere. Where a motion
+    The random force is a process of Matérn's family with ν = 1/2 or 5/2, whichever makes the record more probable: the
+    rougher follows the jumps that dry friction makes, and leaves a wider error band elsewhere. Where a motion
     grows or dies away, the random force does so with it.
     """
     require_x64()
@@ -277,12 +277,7 @@ def _estimate(part: _Part) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarr
     """Mean and covariance of (x, v, a) of every degree of freedom, biases and noise levels, in units of the motion."""
     n, dof = len(part.seen), len(part.places)
     begin, even = part.beliefs[0].packed, np.ones(n)
-    best = _learned(part, part.kind(0), begin, even)
-    for smoothness in _SMOOTHER:
-        other = _learned(part, part.kind(smoothness), begin, even)
-        if other.cost > best.cost:
-            break
-        best, begin = other, other.theta
+    best = min((_learned(part, part.kind(p), begin, even) for p in _SMOOTHNESS), key=lambda found: found.cost)
     best = _swollen(part, best)
     mean, covariance = _smoothed(part, best)
     if np.any(part.spiky):

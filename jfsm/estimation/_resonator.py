@@ -3,7 +3,7 @@ r"""A resonator with a random force, as a linear model on the grid of a record.
     ẍ = -K x - C ẋ + B (g + e) - r,     y = (x, v, ẍ) + bias + noise
 
 g is the measured force and e its white noise. The random force r is a process of Matérn's family with ν = p + 1/2,
-which has p derivatives; its variance may swell and fade along the record.
+which has p derivatives (none or two); its variance may swell and fade along the record.
 """
 
 import math
@@ -96,18 +96,18 @@ class _Built(NamedTuple):
 def _matern(smoothness: int, size, tau):
     """Rate matrix of a Matérn process and its derivatives, density of the noise that drives the last, and covariance.
 
-    `size` (dof,) is its standard deviation; derivatives are blocks of dof. J. Hartikainen, S. Särkkä, IEEE MLSP 2010.
+    It has none or two derivatives; they are blocks of dof, and `size` (dof,) is its standard deviation.
+    J. Hartikainen, S. Särkkä, IEEE MLSP 2010.
     """
     p, eye = smoothness, jnp.eye(size.size)
     rate = math.sqrt(2 * p + 1) / tau
     last = [-math.comb(p + 1, i) * rate ** (p + 1 - i) for i in range(p + 1)]
     upper = jnp.concatenate([jnp.eye(p + 1)[1:], jnp.stack(last)[None, :]])
     density = size**2 * (2 * rate) ** (2 * p + 1) * math.factorial(p) ** 2 / math.factorial(2 * p)
-    # Spectral moments of a Matérn process: var r⁽ⁱ⁾ = size² rate²ⁱ / (1, 1; 3; ...).
-    moments = ([1.0], [1.0, rate**2], [1.0, rate**2 / 3, rate**4])[p]
-    covariance = jnp.diag(jnp.stack([jnp.asarray(m, float) for m in moments]))
+    covariance = jnp.eye(1)
     if p == 2:
-        covariance = covariance.at[0, 2].set(-(rate**2) / 3).at[2, 0].set(-(rate**2) / 3)
+        bend = rate**2 / 3
+        covariance = jnp.diag(jnp.stack([1.0, bend, rate**4])).at[0, 2].set(-bend).at[2, 0].set(-bend)
     driven = jnp.zeros((p + 1, p + 1)).at[p, p].set(1.0)
     return jnp.kron(upper, eye), jnp.kron(driven, jnp.diag(density)), jnp.kron(covariance, jnp.diag(size**2))
 
