@@ -37,6 +37,14 @@ APART = 0.5
 
 Row = dict[str, Any]
 
+_COMPILING: list[float] = []
+"""Seconds that this process has traced and compiled, once it counts them."""
+
+
+def _count(event: str, duration_secs: float, **_: Any) -> None:
+    if event.startswith("/jax/core/compile/"):
+        _COMPILING[0] += duration_secs
+
 
 def examine(cause: str, seed: int, noise: float, excitations: Sequence[str]) -> Row:
     """One record fitted from nowhere and from the law's true numbers."""
@@ -88,15 +96,6 @@ def examine(cause: str, seed: int, noise: float, excitations: Sequence[str]) -> 
         for name, path in names_of.items()
     }
     return row
-
-
-_COMPILING: list[float] = []
-"""Seconds that this process has traced and compiled, once it counts them."""
-
-
-def _count(event: str, duration_secs: float, **_: Any) -> None:
-    if event.startswith("/jax/core/compile/"):
-        _COMPILING[0] += duration_secs
 
 
 def _draw(cause: str, seed: int, noise: float, excitations: Sequence[str]) -> Challenge:

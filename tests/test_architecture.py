@@ -110,6 +110,13 @@ def build_package(root: Path, files: dict[str, str]) -> Path:
     return package
 
 
+def run_program(program: str) -> tuple[str, str]:
+    """Output and errors of a program that a fresh interpreter runs to its end."""
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=PACKAGE.parent)
+    assert run.returncode == 0, run.stderr
+    return run.stdout, run.stderr
+
+
 def test_a_room_imports_only_rooms_listed_above_it():
     assert not room_violations(PACKAGE), "\n".join(room_violations(PACKAGE))
 
@@ -173,9 +180,7 @@ def test_importing_jfsm_changes_no_configuration_and_prints_nothing():
         "assert np.geterr() == before_errors, 'numpy error handling changed'\n"
         "assert not jax._src.xla_bridge._backends, 'a device was started'\n"
     )
-    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=PACKAGE.parent)
-    assert run.returncode == 0, run.stderr
-    assert (run.stdout, run.stderr) == ("", "")
+    assert run_program(program) == ("", "")
 
 
 def test_every_public_name_is_there_and_a_wrong_one_is_missed():
@@ -189,5 +194,4 @@ def test_every_public_name_is_there_and_a_wrong_one_is_missed():
         "from jfsm import *\n"
         "assert diagnose is jfsm.diagnosis.diagnose\n"
     )
-    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=PACKAGE.parent)
-    assert run.returncode == 0, run.stderr
+    run_program(program)

@@ -29,9 +29,6 @@ from ..dynamics._stepper import (
     stopping,
 )
 
-_HALVINGS = 3
-"""Hidden states may relax fast: the series is taken for an eighth of the sample, and squared back."""
-
 _NOTHING = 1e-6
 """Change of a resting link's speed that is none, as a share of what the process noise makes of it in a sample."""
 _SMALL = 8

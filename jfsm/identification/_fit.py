@@ -13,7 +13,7 @@ from ..structures import Structure
 from ._maximise import Maximum, approach, finish
 from ._nuisances import Nuisances, prepare
 from ._posterior import Hypothesis, Posterior, lanes_of
-from ._starts import law_terms, scale_of, starts, with_law
+from ._starts import natural_starts, starts
 from ._unknowns import Unknown, bounded, free_unknown, nuisance_unknowns, with_offsets
 
 _TIED = 0.98
@@ -24,8 +24,6 @@ _STEPS = 60
 _PURSUED = 2
 """Beginnings that are followed to the top."""
 _REFINEMENTS = 3
-_MODEST = 0.05
-"""Size of a law to begin with where the record does not tell one, as a share of the elastic force."""
 _LOOSE = 0.5
 """Relative standard error from which a value is hardly determined."""
 
@@ -102,7 +100,8 @@ def fit(
     free = free_paths(model, prepared, fixed)
     held = {path: value for path, value in model.values().items() if path not in free}
     found = starts(model, prepared[0])
-    beginnings = [model, *(start.with_values(held) for start in [*found, *_spread(model, prepared[0], len(found))])]
+    found += natural_starts(model, prepared[0], lanes_of(model) - 1 - len(found))
+    beginnings = [model, *(start.with_values(held) for start in found)]
     prepared = [n.resolving(beginnings) for n in prepared]
     posterior, best, lane = _best([_beginning(m, free, prepared, bounds or {}) for m in beginnings], prepared)
     posterior, best, lane = _resolved(posterior, best, lane)
@@ -150,21 +149,6 @@ def _beginning(
     for index, nuisances in enumerate(prepared):
         unknowns += nuisance_unknowns(structure, nuisances, index)
     return structure, tuple(unknowns)
-
-
-def _spread(model: Structure, nuisances: Nuisances, known: int) -> list[Structure]:
-    """Further structures to begin from, for the lanes that are free: natural shapes of the law, from end to end."""
-    laws, free = law_terms(model), lanes_of(model) - 1 - known
-    if len(laws) != 1 or free < 1:
-        return []
-    shapes = type(laws[0]).shapes(scale_of(nuisances, model))
-    chosen = [shapes[i] for i in np.linspace(0, len(shapes) - 1, free).round().astype(int)]
-    stays = {p.name: float(getattr(laws[0], p.name)) for p in laws[0].parameters if not p.free}
-    share = {p.name: _MODEST if p.force else 1.0 for p in laws[0].parameters}
-    return [
-        with_law(model, laws[0], {name: share[name] * value for name, value in shape.items()} | stays)
-        for shape in chosen
-    ]
 
 
 def _best(beginnings: Sequence[tuple], prepared: Sequence[Nuisances]) -> tuple[Posterior, Maximum, int]:

@@ -30,7 +30,7 @@ _LEAST_DISTURBANCE = 2e-4
 """Acceleration that is never explained, as a share of its size, white over a radian of the motion."""
 _BAND_LIMITED = 1e-3
 """Noise of a channel whose signal fills its band, as a share of its size: nothing in it tells."""
-FINEST = 2
+_FINEST = 2
 """Samples per knot at which a spline's residual holds signal as well."""
 _OVERSAMPLED = 3
 """Samples per knot from which a spline's curve may stand for the force: the band above holds noise only."""
@@ -124,67 +124,34 @@ def prepare(
         )
     if len(record) < 32:
         raise ValueError(f"`record` must hold at least 32 samples to tell noise from motion; it has {len(record)}.")
-    dt, dof = record.dt, model.dof
     channels = tuple(record.responses)
-    notes: list[str] = list(record.notes)
     values = np.column_stack([record.responses[c] for c in channels])
     spread = np.std(values, axis=0)
     for channel, size in zip(channels, spread, strict=True):
         if size == 0:
             raise ValueError(f"`{channel[0]}` {channel[1]} is constant; leave a dead channel out of the record.")
-    use = np.ones_like(values)
-    floors, trusted = [], []
-    for i, (kind, j) in enumerate(channels):
-        floor = noise_floor(values[:, i], dt)
-        trusted.append(floor.spacing > FINEST)
-        floors.append(
-            max(floor.std if trusted[-1] else min(floor.std, _BAND_LIMITED * spread[i]), _LEAST_NOISE * spread[i])
-        )
-        lost = clipped(values[:, i]) | spikes(values[:, i], floors[-1])
-        if np.any(lost):
-            use[lost, i] = 0.0
-            notes.append(f"{kind} {j}: {int(lost.sum())} clipped or torn samples take no part.")
+    use, floor, trusted, torn = _noise(channels, values, spread, record.dt)
     force, force_variance, share, words = _force(record, model)
-    notes += words
-    omega = fastest_mode(model) or _rate(values[:, 0], dt)
+    omega = fastest_mode(model) or _rate(values[:, 0], record.dt)
     length, crest = _size(channels, values, spread, omega)
     masses = np.asarray((weighed or model).mass)
-    mass = masses if masses.ndim == 1 else np.diag(masses)
-    variance = np.array(floors) ** 2
+    mass = np.diag(masses) if masses.ndim == 1 else masses
+    variance = floor**2
     for i, (kind, j) in enumerate(channels):
         if kind == "acceleration":  # an acceleration is predicted with the force's own noise, less what smoothing took
-            variance[i] += force_variance[j - 1] * share[j - 1] / mass[j - 1] ** 2
-    n, padded = len(record), bucket(len(record))
-    fill = ((0, padded - n), (0, 0))
-    readings = Readings(
-        values=jnp.asarray(np.pad(values, fill)),
-        use=jnp.asarray(np.pad(use, fill)),
-        variance=jnp.asarray(variance),
-        valid=jnp.asarray(np.arange(padded) < n, dtype=jnp.float64),
-    )
-    size = omega**2 * length
-    inverse = np.linalg.inv(np.diag(masses) if masses.ndim == 1 else masses)
-    disturbed = (
-        inverse @ np.diag(force_variance * dt**2) @ inverse.T
-        + np.eye(dof) * (_LEAST_DISTURBANCE * size) ** 2 / omega * dt
-    )
-    x0, v0 = starting_state(model, record, reconstruction=reconstruction)
-    for i, (kind, j) in enumerate(channels):  # what is measured tells more than a model that lacks something
-        if kind != "acceleration" and not record.at_rest:
-            (x0 if kind == "displacement" else v0)[j - 1] = values[0, i]
+            variance[i] += force_variance[j - 1] * share[j - 1] / mass[j - 1, j - 1] ** 2
+    x0, v0 = _start(record, model, reconstruction)
     return Nuisances(
         record=record,
         channels=channels,
-        show=readout(channels, dof),
-        fine=excitation(
-            record, dof, substeps_for(model, dt, typical_speed(record)), reconstruction, length=padded, force=force
-        ),
-        readings=readings,
-        noise=ProcessNoise(jnp.asarray(disturbed)),
+        show=readout(channels, model.dof),
+        fine=_drive(record, model, reconstruction, force),
+        readings=_padded(values, use, variance),
+        noise=_disturbance(mass, force_variance, omega, length, record.dt),
         force_variance=force_variance,
         spread=spread,
-        floor=np.array(floors),
-        trusted=np.array(trusted),
+        floor=floor,
+        trusted=trusted,
         length=length,
         crest=crest,
         omega=omega,
@@ -192,8 +159,61 @@ def prepare(
         v0=v0,
         at_rest=record.at_rest,
         reconstruction=reconstruction,
-        notes=tuple(notes),
+        notes=(*record.notes, *torn, *words),
     )
+
+
+def _noise(
+    channels: tuple[Channel, ...], values: np.ndarray, spread: np.ndarray, dt: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
+    """Which readings (n, channels) take part, standard deviation of each channel's noise, whether it is trusted, and
+    notes."""
+    use, floor, trusted = np.ones_like(values), np.zeros(len(channels)), np.zeros(len(channels), dtype=bool)
+    notes = []
+    for i, (kind, j) in enumerate(channels):
+        found = noise_floor(values[:, i], dt)
+        trusted[i] = found.spacing > _FINEST
+        std = found.std if trusted[i] else min(found.std, _BAND_LIMITED * spread[i])
+        floor[i] = max(std, _LEAST_NOISE * spread[i])
+        lost = clipped(values[:, i]) | spikes(values[:, i], floor[i])
+        if np.any(lost):
+            use[lost, i] = 0.0
+            notes.append(f"{kind} {j}: {int(lost.sum())} clipped or torn samples take no part.")
+    return use, floor, trusted, notes
+
+
+def _padded(values: np.ndarray, use: np.ndarray, variance: np.ndarray) -> Readings:
+    """Readings of a length that programs are made for."""
+    n, padded = len(values), bucket(len(values))
+    fill = ((0, padded - n), (0, 0))
+    return Readings(
+        values=jnp.asarray(np.pad(values, fill)),
+        use=jnp.asarray(np.pad(use, fill)),
+        variance=jnp.asarray(variance),
+        valid=jnp.asarray(np.arange(padded) < n, dtype=jnp.float64),
+    )
+
+
+def _disturbance(mass: np.ndarray, force_variance: np.ndarray, omega: float, length: float, dt: float) -> ProcessNoise:
+    """What the noise of the force and what is never explained do to the velocity in a sample."""
+    inverse, size = np.linalg.inv(mass), omega**2 * length
+    forced = inverse @ np.diag(force_variance * dt**2) @ inverse.T
+    return ProcessNoise(jnp.asarray(forced + np.eye(len(mass)) * (_LEAST_DISTURBANCE * size) ** 2 / omega * dt))
+
+
+def _start(record: Record, model: Structure, reconstruction: Reconstruction) -> tuple[np.ndarray, np.ndarray]:
+    """First guess of the initial state: what is measured tells more than a model that lacks something."""
+    x0, v0 = starting_state(model, record, reconstruction=reconstruction)
+    for (kind, j), samples in record.responses.items():
+        if kind != "acceleration" and not record.at_rest:
+            (x0 if kind == "displacement" else v0)[j - 1] = samples[0]
+    return x0, v0
+
+
+def _drive(record: Record, model: Structure, reconstruction: Reconstruction, force: np.ndarray) -> Fine:
+    """Drive by these samples of the force, in steps short enough for the model, as long as the padded readings."""
+    substeps = substeps_for(model, record.dt, typical_speed(record))
+    return excitation(record, model.dof, substeps, reconstruction, length=bucket(len(record)), force=force)
 
 
 def _rate(y: np.ndarray, dt: float) -> float:

@@ -29,6 +29,8 @@ _CORRELATED = 20.0
 """Samples of a smoothed force that count as one."""
 _LEAST = 1e-4
 """Size of an effect, as a share of the elastic force, below which it is no start."""
+_MODEST = 0.05
+"""Size of a law to begin with where the record does not tell one, as a share of the elastic force."""
 
 
 def scale_of(nuisances: Nuisances, structure: Structure) -> Scale:
@@ -57,7 +59,7 @@ def missing_force(structure: Structure, nuisances: Nuisances) -> Latent:
     )
 
 
-def law_terms(structure: Structure) -> tuple[AbstractTerm, ...]:
+def _laws(structure: Structure) -> tuple[AbstractTerm, ...]:
     """Terms whose numbers a search may begin elsewhere than where they stand."""
     return tuple(t for t in structure.terms if not isinstance(t, LinearStiffness | LinearDamping | MapTerm))
 
@@ -67,7 +69,7 @@ def starts(structure: Structure, nuisances: Nuisances, most: int = 3, rounds: in
 
     With several laws each is placed in turn beside the others, and only the best of all comes back.
     """
-    laws = law_terms(structure)
+    laws = _laws(structure)
     if not laws:
         return []
     rest = structure
@@ -87,9 +89,19 @@ def starts(structure: Structure, nuisances: Nuisances, most: int = 3, rounds: in
     return [_with(structure, {id(law): best[i] for i, law in enumerate(laws) if i in best})]
 
 
-def with_law(structure: Structure, law: AbstractTerm, numbers: Mapping[str, float]) -> Structure:
-    """The structure with one of its laws at other numbers."""
-    return _with(structure, {id(law): type(law)(**numbers, at=law.at)})
+def natural_starts(structure: Structure, nuisances: Nuisances, count: int) -> list[Structure]:
+    """The structure with its law at `count` of its natural shapes, from end to end; none unless it has just one law."""
+    laws = _laws(structure)
+    if len(laws) != 1 or count < 1:
+        return []
+    law, kind = laws[0], type(laws[0])
+    shapes = kind.shapes(scale_of(nuisances, structure))
+    share = {p.name: _MODEST if p.force else 1.0 for p in kind.parameters}
+    found = []
+    for i in np.linspace(0, len(shapes) - 1, count).round().astype(int):
+        numbers = {name: share[name] * value for name, value in shapes[i].items()} | _stays(law)
+        found.append(_with(structure, {id(law): kind(**numbers, at=law.at)}))
+    return found
 
 
 def _with(structure: Structure, instead: Mapping[int, AbstractTerm]) -> Structure:
@@ -153,11 +165,15 @@ def _numbers(law: AbstractTerm, scale: Scale, sides: bool) -> list[dict[str, flo
     """Natural shapes of a law; a side that was chosen stays, and so does the origin of time."""
     if sides:
         return type(law).shapes(scale)
-    stays = {p.name: float(getattr(law, p.name)) for p in law.parameters if not p.free}
-    rows = type(law).shapes(scale)
+    stays, rows = _stays(law), type(law).shapes(scale)
     if "side" in stays:
         rows = [row for row in rows if row["side"] == stays["side"]]
     return [row | stays for row in rows]
+
+
+def _stays(law: AbstractTerm) -> dict[str, float]:
+    """Numbers that are never fitted, as they are."""
+    return {p.name: float(getattr(law, p.name)) for p in law.parameters if not p.free}
 
 
 def _lots(kind: type[AbstractTerm], rows: list[dict[str, float]]):

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jfsm.records._tapers import Pieces, Samples
+from jfsm.records._tapers import SHORTEST_PIECE, Pieces, Samples
 
 PIECES = 16  # at least, and so many for each driving channel
-SHORTEST_PIECE = 32
 
 
 @dataclass(frozen=True)

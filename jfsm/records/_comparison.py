@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from jfsm.records._tapers import Pieces, Samples, Spectra
+from jfsm.records._tapers import SHORTEST_PIECE, Pieces, Samples, Spectra
 
 PERIODS = 4  # of the strongest frequency in a piece
-FEWEST_PIECES, SHORTEST_PIECE = 4, 32
+FEWEST_PIECES = 4
 PASSES = 3  # until the pieces stand as late as the channel is
 CLEAR = 50.0  # power over noise from which on a frequency takes part
 MODEL_ERROR = 0.02  # relative error of a spectrum that no noise explains: what bends between samples

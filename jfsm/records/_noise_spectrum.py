@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jfsm.records._noise_floor import NoiseFloor
-from jfsm.records._tapers import Pieces
+from jfsm.records._tapers import SHORTEST_PIECE, Pieces
 
 PIECE, PIECES = 256, 8  # samples in a piece at most, and pieces at least
 ABOVE = 1.4  # times the band limit of the smooth curve: from here on it takes nothing from the noise
@@ -50,7 +50,7 @@ def noise_spectrum(channel: str, y: NDArray[np.float64], floor: NoiseFloor) -> N
     The median over pieces is taken, so that jumps and spikes count as what they are: rare.
     """
     length = min(PIECE, 2 * y.size // (PIECES + 1))
-    if length < 32:
+    if length < SHORTEST_PIECE:
         return None
     pieces = Pieces.of(y.size, length, floor.dt)
     frequency = pieces.omega / (2.0 * np.pi)

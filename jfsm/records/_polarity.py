@@ -3,9 +3,9 @@
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from jfsm.records._tapers import Pieces, Samples, Spectra
+from jfsm.records._tapers import SHORTEST_PIECE, Pieces, Samples, Spectra
 
-PERIODS, FEWEST_PIECES, SHORTEST_PIECE = 8, 6, 32
+PERIODS, FEWEST_PIECES = 8, 6
 PEAK = 0.01  # share of the strongest line's power from which a line belongs to the resonance
 ERRORS = 6.0
 CORRELATED = 4.0  # pieces overlap by half, and the taper ties neighbouring lines together

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jfsm.records._tapers import Pieces, Samples
+from jfsm.records._tapers import SHORTEST_PIECE, Pieces, Samples
 
-PIECES, SHORTEST_PIECE = 8, 32
+PIECES = 8
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 Samples = NDArray[np.float64]
 Spectra = NDArray[np.complex128]
 
+SHORTEST_PIECE = 32  # samples; the taper leaves few lines of a shorter one
+
 
 @dataclass(frozen=True)
 class Pieces:

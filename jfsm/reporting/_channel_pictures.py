@@ -12,7 +12,6 @@ from jfsm.reporting._curves import Curve, curve, envelope, loudest_stretch, peak
 from jfsm.reporting._quantities import quantity, scale_for
 from jfsm.reporting._wording import counted
 
-MOST_CHANNELS = 6
 DEFECTS = {"clipped": BEFORE, "spikes": REFITTED}
 MOST_MARKS, MOST_GAPS = 300, 100
 VISIBLE = 1 / 400  # of the time axis: a gap as wide as that interrupts the line
@@ -23,7 +22,7 @@ Gap = Sequence[float]
 
 def draw_channels(figure: FigureBase, curves: Mapping[str, Any], gaps: Sequence[Gap]) -> None:
     """A row a channel: all of it, and a close-up beside if it is dense or has a spike."""
-    channels = shown_channels(curves)
+    channels = curves["channels"]
     time = curve(curves["time"])
     views = [_close_up(channel) for channel in channels.values()]
     grid = figure.add_gridspec(len(channels), 2 if any(views) else 1, width_ratios=[7, 5] if any(views) else [1])
@@ -43,14 +42,10 @@ def draw_channels(figure: FigureBase, curves: Mapping[str, Any], gaps: Sequence[
             close.set_xlabel("time [s]" if last else "")
 
 
-def shown_channels(curves: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    return dict(list(curves["channels"].items())[:MOST_CHANNELS])
-
-
 def describe_channels(curves: Mapping[str, Any], gaps: Sequence[Gap]) -> str:
     """The picture in words."""
     parts = []
-    for name, channel in shown_channels(curves).items():
+    for name, channel in curves["channels"].items():
         marks = [
             f"{np.count_nonzero(channel[kind])} samples marked as {kind}" for kind in DEFECTS if channel[kind].any()
         ]

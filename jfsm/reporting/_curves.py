@@ -1,6 +1,6 @@
 """Curves for drawing: arrays from lists, fewer points, a stretch worth a closer look."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,13 @@ Curve = NDArray[np.float64]
 def curve(values: Sequence[Any] | None) -> Curve:
     """Float array of a list in which None, as JSON has it, is a gap."""
     return np.array([] if values is None else values, dtype=np.float64)
+
+
+def first_channels(curves: Mapping[str, Any], most: int) -> tuple[dict[str, Any], str]:
+    """The same curves with the first channels alone, and a sentence that says so where some are left out."""
+    channels = curves["channels"]
+    words = f" {most} of {len(channels)} channels are shown." if most < len(channels) else ""
+    return {**curves, "channels": dict(list(channels.items())[:most])}, words
 
 
 def rms(values: Curve) -> float | None:

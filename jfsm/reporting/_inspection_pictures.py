@@ -3,7 +3,8 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from jfsm.reporting._channel_pictures import describe_channels, draw_channels, shown_channels
+from jfsm.reporting._channel_pictures import describe_channels, draw_channels
+from jfsm.reporting._curves import first_channels
 from jfsm.reporting._motion_pictures import (
     describe_consistency,
     describe_planes,
@@ -22,6 +23,8 @@ from jfsm.reporting._spectrum_pictures import (
     panel_rows,
 )
 
+MOST_CHANNELS = 6
+
 
 def inspection_pictures(d: Mapping[str, Any]) -> tuple[Picture, ...]:
     """Every picture that an inspection has data for, in the order of the page.
@@ -38,14 +41,13 @@ def inspection_pictures(d: Mapping[str, Any]) -> tuple[Picture, ...]:
 def _sketches(d: Mapping[str, Any]) -> Iterator[Sketch]:
     curves, gaps, channels = d.get("curves") or {}, d.get("gaps") or (), d.get("channels") or ()
     if curves.get("channels"):
-        shown, measured = len(shown_channels(curves)), len(curves["channels"])
-        left_out = f" {shown} of {measured} channels are shown." if shown < measured else ""
+        curves, left_out = first_channels(curves, MOST_CHANNELS)
         yield Sketch(
             "channels",
             "The channels over time",
             "Clipped samples and spikes are marked: they are no readings." + left_out,
             describe_channels(curves, gaps),
-            0.4 + 1.75 * shown,
+            0.4 + 1.75 * len(curves["channels"]),
             lambda figure: draw_channels(figure, curves, gaps),
         )
     spectra = d.get("spectra") or ()

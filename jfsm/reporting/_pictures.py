@@ -6,11 +6,14 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from jfsm.reporting._canvas import house_style
+from jfsm.reporting._curves import first_channels
 from jfsm.reporting._force_pictures import describe_map, describe_residual, draw_map, draw_residual
-from jfsm.reporting._record_picture import describe_record, draw_record, drawn_channels
+from jfsm.reporting._record_picture import describe_record, draw_record
 from jfsm.reporting._score_pictures import describe_gain, describe_ranking, draw_gain, draw_ranking, ranked_size
 from jfsm.reporting._sketch import WIDTH, Picture, Sketch, drawn
 from jfsm.reporting._wording import checked_verdict
+
+MOST_CHANNELS = 3
 
 
 def pictures(d: Mapping[str, Any]) -> tuple[Picture, ...]:
@@ -56,14 +59,13 @@ def _sketches(d: Mapping[str, Any]) -> Iterator[Sketch]:
     checked_verdict(d)
     curves = d.get("curves") or {}
     if (holdout := curves.get("holdout")) and holdout.get("channels"):
-        shown, measured = len(drawn_channels(holdout)), len(holdout["channels"])
-        left_out = f" {shown} of {measured} channels are shown." if shown < measured else ""
+        holdout, left_out = first_channels(holdout, MOST_CHANNELS)
         yield Sketch(
             "record",
             "The held-out record",
             "Free runs over data that took no part in the fit; below each, its error." + left_out,
             describe_record(holdout),
-            0.4 + 3.6 * shown,
+            0.4 + 3.6 * len(holdout["channels"]),
             lambda figure: draw_record(figure, holdout),
         )
     residual, law = curves.get("residual"), curves.get("law")

@@ -11,13 +11,12 @@ from jfsm.reporting._canvas import AFTER, BEFORE, MEASURED, MUTED, key_above, la
 from jfsm.reporting._curves import Curve, curve, envelope, loudest_stretch, peak, rms
 from jfsm.reporting._quantities import quantity, scale_for
 
-MOST_CHANNELS = 3
 MODELS = {"before": ("as given", BEFORE), "after": ("extended", AFTER)}
 
 
 def draw_record(figure: FigureBase, holdout: Mapping[str, Any]) -> None:
     """A channel in two rows, curves above errors, and a close-up beside them if the curves are dense."""
-    channels = drawn_channels(holdout)
+    channels = holdout["channels"]
     time = curve(holdout["time"])
     stretches = [loudest_stretch(curve(channel["measured"])) for channel in channels.values()]
     widths = [7, 5] if any(stretches) else [1]
@@ -35,14 +34,10 @@ def draw_record(figure: FigureBase, holdout: Mapping[str, Any]) -> None:
             close.set_title("loudest stretch", fontweight="normal", color=MUTED)
 
 
-def drawn_channels(holdout: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    return dict(list(holdout["channels"].items())[:MOST_CHANNELS])
-
-
 def describe_record(holdout: Mapping[str, Any]) -> str:
     """The picture in words, for those who cannot see it."""
     parts = []
-    for name, channel in drawn_channels(holdout).items():
+    for name, channel in holdout["channels"].items():
         measured, unit = curve(channel["measured"]), channel.get("unit")
         errors = [
             f"rms error {quantity(rms(values - measured), unit)} {word}"
