@@ -169,38 +169,35 @@ def advance(plant: Plant, minv, motion: Motion, load: Load) -> Motion:
     if not len(plant.friction):
         return end
     ended = acceleration(plant, minv, *end, load.force[2], load.time + load.step)[1] < 0
-    return jax.lax.cond(jnp.any(ended), lambda: _segments(plant, minv, motion, load), lambda: end)
+    return jax.lax.cond(jnp.any(ended), lambda: _segments(plant, minv, motion, end, load), lambda: end)
 
 
-def _segments(plant: Plant, minv, motion: Motion, load: Load) -> Motion:
-    """Motion at the end of a step in which modes end."""
-    x, v, z, mode = motion
-    zero, one = jnp.zeros(()), jnp.ones(())
+def _segments(plant: Plant, minv, motion: Motion, end: Motion, load: Load) -> Motion:
+    """Motion at the end of a step in which modes end; `end` is where the first of them would lead."""
+    rows, one = plant.friction.direction, jnp.ones(())
 
-    def segment(carry, last):
-        x, v, z, mode, start = carry
+    def switch(carry, _):
+        (x, v, z, mode), start, (xe, ve, ze, _) = carry
         left = 1.0 - start
-        xe, ve, ze = _in_mode(plant, minv, x, v, z, mode, load, start, left)
-        ended = (acceleration(plant, minv, xe, ve, ze, mode, load.at(one), load.time + load.step)[1] < 0) & ~last
+        ended = acceleration(plant, minv, xe, ve, ze, mode, load.at(one), load.time + load.step)[1] < 0
         path = _path(plant, minv, (x, v, z), (xe, ve, ze), mode, load, start, left)
         shares = jnp.where(ended, _event(plant, minv, path, mode, load, start, left), 1.0)
         share = jnp.min(shares)
-        any_event = jnp.any(ended)
         xs, vs, zs = path(share)
         now = start + left * share
         switching = ended & (shares == share)
-        rows = plant.friction.direction
         vs = vs - stopping(minv, rows, jnp.sum(rows * vs[None, :], 1), switching & (mode != 0))
         resting = jnp.where(switching, 0.0, mode)
         broken = switching & (mode == 0)
         decided = _from_rest(plant, minv, xs, vs, zs, load.at(now), load.time + now * load.step, resting, broken)
-        x, v, z = (jnp.where(any_event, at, end) for at, end in ((xs, xe), (vs, ve), (zs, ze)))
-        return (x, v, z, jnp.where(switching, decided, mode), jnp.where(any_event, now, 1.0)), None
+        at = Motion(xs, vs, zs, jnp.where(switching, decided, mode))
+        then = Motion(*_in_mode(plant, minv, *at, load, now, 1.0 - now), at.mode)
+        switched, kept = (at, now, then), carry
+        return jax.tree.map(lambda new, old: jnp.where(jnp.any(ended), new, old), switched, kept), None
 
-    # The last segment goes to the end whatever happens; a step is short beside the time between reversals.
-    last = jnp.arange(_SEGMENTS) == _SEGMENTS - 1
-    (x, v, z, mode, _), _ = jax.lax.scan(segment, (x, v, z, mode, zero), last)
-    return Motion(x, v, z, mode)
+    # The last mode goes to the end whatever happens; a step is short beside the time between reversals.
+    (_, _, end), _ = jax.lax.scan(switch, (motion, jnp.zeros(()), end), length=_SEGMENTS - 1)
+    return end
 
 
 def stopping(minv, rows, speed, stopped):
