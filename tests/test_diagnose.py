@@ -89,6 +89,10 @@ def test_every_candidate_but_the_named_one_says_why_it_lost(hidden_cubic):
         assert (candidate.why == "named") == (candidate.cause == "cubic_hardening")
 
 
+def test_a_notebook_shows_the_verdict_in_a_line(hidden_cubic):
+    assert repr(hidden_cubic) == f"<Diagnosis, cause: {hidden_cubic.sentence}>"
+
+
 def test_the_verdict_is_written_as_json_and_as_a_page(hidden_cubic, tmp_path):
     hidden_cubic.to_json(tmp_path / "d.json")
     hidden_cubic.report(tmp_path / "d.html")

@@ -58,7 +58,7 @@ class CandidateResult:
     why: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Diagnosis:
     """What is wrong, why, how sure, and what mending it is worth; see the fields' own classes."""
 
@@ -75,6 +75,9 @@ class Diagnosis:
     advice: str
     data: dict[str, Any]
     """Everything that `to_json` writes and the page shows, as plain types."""
+
+    def __repr__(self) -> str:
+        return f"<Diagnosis, {self.verdict}: {self.sentence}>"
 
     def print(self) -> None:
         """Verdict, findings and gain on the terminal."""
