@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jfsm
-from jfsm.diagnosis._candidates import SOUGHT
+from jfsm.diagnosis._candidates import SOUGHT, Candidate, promising
 from jfsm.identification import _likelihood
 
 MASS, STIFFNESS, DAMPING, CUBIC = 2.0, 18.0, 0.5, 4.0
@@ -184,3 +184,12 @@ def test_records_without_response_or_too_short_are_refused(believed):
         jfsm.diagnose([], believed)
     with pytest.raises(TypeError, match="must be a jfsm.Record"):
         jfsm.diagnose([record.time], believed)  # pyright: ignore[reportArgumentType]
+
+
+def test_the_most_promising_laws_are_fitted_and_every_sensor():
+    known = jfsm.causes()
+    laws = [Candidate(known["coulomb"], (0, j), (), 0.01 * j) for j in range(12)]
+    sensor = Candidate(known["force_gain"], ("force", 1), ())
+    followed, left_out = promising([*laws, sensor])
+    assert followed == [*laws[4:], sensor]
+    assert left_out == laws[:4]

@@ -74,3 +74,12 @@ def test_the_force_along_a_given_motion_is_that_of_the_law(term, expected):
         np.testing.assert_allclose(found[200:], response[200:], atol=5e-3)
     else:
         np.testing.assert_allclose(found[1:], expected(T)[1:], atol=2e-3)
+
+
+def test_shapes_too_stiff_for_the_samples_leave_the_others_to_begin_from():
+    fine = record(lambda x, v: np.tanh(v / 0.3))
+    assert fine.force is not None and fine.displacement is not None and fine.velocity is not None
+    coarse = jfsm.Record(fine.time[::3], fine.force[::3], fine.displacement[::3], fine.velocity[::3], at_rest=True)
+    bristles = MODEL + jfsm.LuGre(1.0, 1.0, 0.3, 50.0, 1.0, at=(0, 1))
+    first = starts(bristles, prepare(coarse, bristles))[0].values()
+    assert first["lugre@0-1.F"] == pytest.approx(1.0, rel=0.5)

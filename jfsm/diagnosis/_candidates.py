@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import zip_longest
+from itertools import compress, zip_longest
 
 from ..estimation import Latent
 from ..identification import (
@@ -14,6 +14,7 @@ from ..identification import (
     Nuisances,
     Unknown,
     effect_unknown,
+    lanes_of,
     missing_force,
     natural_size,
     nuisance_unknowns,
@@ -32,7 +33,9 @@ A softening spring that outweighs the elastic one at a peak would let the motion
 
 
 _SHAPES = 2
-"""Shapes of a law that are followed."""
+"""Starts of a law."""
+_FOLLOWED = 8
+"""Laws that are fitted, the most promising ones."""
 SOUGHT = (
     "cubic_hardening", "cubic_softening", "quadratic_stiffness", "coulomb", "quadratic_damping", "force_gain",
     "accel_gain",
@@ -42,11 +45,15 @@ SOUGHT = (
 
 @dataclass(frozen=True)
 class Candidate:
-    """A cause at a place; `starts` are the structures that a fit begins from."""
+    """A cause at a place; `starts` are the structures that a fit begins from.
+
+    `share` is how much of the missing force the best of them explains by regression; None for sensors, which lack none.
+    """
 
     cause: Cause
     at: tuple
     starts: tuple[Structure, ...]
+    share: float | None = None
 
 
 def chosen_causes(selection: Sequence[str | Cause] | None) -> dict[str, Cause]:
@@ -80,38 +87,46 @@ def candidates(
     places: Sequence[tuple] | None = None,
 ) -> list[Candidate]:
     """Every cause of `selection` at every place: link laws on the model's links, sensor effects on the channels."""
-    found, shaped = [], _Shaped(model, records[0])
+    found, laws = [], _Laws(model, records[0])
     for cause in selection.values():
         if not any(p.free for p in cause.effect.parameters):
             continue  # nothing to fit: what a clipped channel lost takes no part anyway
         if cause.is_sensor:
             kinds = [kind for kind in cause.effect.channels if _has_scale(kind, records)]
-            spots: list[tuple] = list(dict.fromkeys(c for n in records for c in n.record.channels if c[0] in kinds))
+            spots = dict.fromkeys(c for n in records for c in n.record.channels if c[0] in kinds)
+            found += [Candidate(cause, at, _natural_starts(model, cause, at, records[0])) for at in spots]
         else:
-            spots = list(model.links) if places is None else list(places)
-        for at in spots:
-            several = not cause.is_sensor and len(cause.effect.parameters) > 1
-            starts = shaped.starts(cause, at) if several else _starts(model, cause, at, records[0])
-            if starts:
-                found.append(Candidate(cause, tuple(at), starts))
+            placed = [laws.candidate(cause, (i, j)) for i, j in (model.links if places is None else places)]
+            found += [candidate for candidate in placed if candidate.starts]
     return found
 
 
-class _Shaped:
-    """Starts of laws with a shape of their own: those that explain most of what the model lacks."""
+def promising(tried: Sequence[Candidate]) -> tuple[list[Candidate], list[Candidate]]:
+    """Candidates that are worth a fit, and those that are not: laws that explain least of the missing force."""
+    ranked = sorted((c.share for c in tried if c.share is not None), reverse=True)
+    least = ranked[_FOLLOWED - 1] if len(ranked) > _FOLLOWED else -math.inf
+    chosen = [c.share is None or c.share >= least for c in tried]
+    return list(compress(tried, chosen)), list(compress(tried, [not c for c in chosen]))
+
+
+class _Laws:
+    """Laws as candidates, begun where they explain most of what the model lacks."""
 
     def __init__(self, model: Structure, nuisances: Nuisances):
-        self.model, self.nuisances = model, nuisances
+        self.model, self.nuisances, self.scale = model, nuisances, scale_of(nuisances, model)
 
     @cached_property
     def missing(self) -> Latent:
         return missing_force(self.model, self.nuisances)
 
-    def starts(self, cause: Cause, at: tuple[int, int]) -> tuple[Structure, ...]:
-        scale = scale_of(self.nuisances, self.model)
-        law = cause.effect(**cause.effect.shapes(scale)[0], at=at)
-        found = place(law, self.missing, self.model, scale, self.nuisances, sides=True, sign=cause.sign)
-        return tuple(self.model + term for term in found[:_SHAPES])
+    def candidate(self, cause: Cause, at: tuple[int, int]) -> Candidate:
+        law = cause.effect(**cause.effect.shapes(self.scale)[0], at=at)
+        placed = place(law, self.missing, self.model, self.scale, self.nuisances, sides=True, sign=cause.sign)
+        starts = [self.model + start.term for start in placed[:_SHAPES]]
+        if len(cause.effect.parameters) == 1:  # has one shape; a missing force that is ill seen may not show its size
+            natural = _natural_starts(self.model, cause, at, self.nuisances)
+            starts += natural[: min(_SHAPES, lanes_of(natural[0])) - len(starts)]
+        return Candidate(cause, at, tuple(starts), placed[0].share if placed else 0.0)
 
 
 def _has_scale(kind: str, records: Sequence[Nuisances]) -> bool:
@@ -126,7 +141,7 @@ def driven(nuisances: Nuisances) -> bool:
     return bool(nuisances.fine.force.any() or nuisances.fine.base.any())
 
 
-def _starts(model: Structure, cause: Cause, at: tuple, nuisances: Nuisances) -> tuple[Structure, ...]:
+def _natural_starts(model: Structure, cause: Cause, at: tuple, nuisances: Nuisances) -> tuple[Structure, ...]:
     structures = []
     parameter = cause.effect.parameters[0]
     # A law of degree n in the displacement weighs crest^(n - 1) times more at the largest displacement.

@@ -12,7 +12,7 @@ from ..dynamics import Reconstruction
 from ..identification import Nuisances, prepare
 from ..records import Record
 from ..structures import Cause, Structure
-from ._candidates import candidates, chosen_causes
+from ._candidates import candidates, chosen_causes, promising
 from ._decide import decide
 from ._diagnosis import Diagnosis
 from ._gain import measure_gain
@@ -78,7 +78,7 @@ def diagnose(
     whole = [whole for whole, _ in training]
     until = [fit for _, fit in training]
     records = [prepare(r, model, reconstruction) for r in whole]
-    tried = candidates(model, records, chosen, places)
+    tried, left_out = promising(candidates(model, records, chosen, places))
     steps = _Steps(progress, 4)
 
     steps.next("the model as given")
@@ -108,7 +108,7 @@ def diagnose(
         gain, runs = measure_gain(
             model, refitted.extended(), extended, held, noise, first.omega, first.reconstruction, key
         )
-    return assemble(decision, refitted, trials, model, extended, records, missing, gain, runs)
+    return assemble(decision, refitted, trials, left_out, model, extended, records, missing, gain, runs)
 
 
 def _outweighed(model: Structure, refitted: Structure) -> bool:

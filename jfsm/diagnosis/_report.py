@@ -8,6 +8,7 @@ import numpy as np
 
 from ..identification import Nuisances
 from ..structures import PARAMETER_CAUSES, Structure
+from ._candidates import Candidate
 from ._decide import Decision
 from ._detectable import detectable
 from ._diagnosis import CandidateResult, Diagnosis, Estimate, Finding, Rival
@@ -25,6 +26,7 @@ def assemble(
     decision: Decision,
     refitted: Trial,
     trials: list[Trial],
+    left_out: list[Candidate],
     model: Structure,
     extended: Structure,
     records: list[Nuisances],
@@ -35,8 +37,9 @@ def assemble(
     """The diagnosis, with everything that the report needs."""
     units = records[0].record.units
     findings = _findings(decision, trials, model, units)
-    candidates = tuple(
-        _candidate(t, decision, refitted, model, units) for t in sorted(trials, key=lambda t: -t.evidence)
+    candidates = (
+        *(_candidate(t, decision, refitted, model, units) for t in sorted(trials, key=lambda t: -t.evidence)),
+        *(_passed_over(c) for c in sorted(left_out, key=lambda c: -(c.share or 0.0))),
     )
     winner = decision.winner if decision.winner.at != ("given",) else refitted
     refit = {
@@ -157,6 +160,12 @@ def _candidate(t: Trial, decision: Decision, refitted: Trial, model: Structure, 
         t.name, t.at, t.evidence - refitted.evidence, {n: float(e) for n, e in zip(names, error, strict=True)},
         decision.kappa.get(id(t), 0.0), decision.share(t), _effect(t, model, units), why,
     )  # fmt: skip
+
+
+def _passed_over(c: Candidate) -> CandidateResult:
+    share = c.share or 0.0
+    why = f"not fitted: explains {share:.0%} of the missing force, and other laws more"
+    return CandidateResult(c.cause.id, c.at, -math.inf, {}, share, 0.0, {}, why)
 
 
 def _words(decision: Decision, findings: tuple[Finding, ...], gain: Gain | None) -> tuple[str, str]:

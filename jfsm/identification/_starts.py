@@ -6,6 +6,8 @@ and the offsets. It is equation error, good for a start and for nothing more.
 """
 
 from collections.abc import Mapping, Sequence
+from itertools import compress
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -27,10 +29,19 @@ _SPRING, _DASHPOT, _CONSTANT = 0.15, 1.0, 10.0
 """How far springs and dashpots may be off, as shares of themselves, and a constant force as a share of the missing."""
 _CORRELATED = 20.0
 """Samples of a smoothed force that count as one."""
+_RUN_AWAY = 1e9
+"""Force of a hidden state that its steps could not follow, as a multiple of the missing one."""
 _LEAST = 1e-4
 """Size of an effect, as a share of the elastic force, below which it is no start."""
 _MODEST = 0.05
 """Size of a law to begin with where the record does not tell one, as a share of the elastic force."""
+
+
+class Placed(NamedTuple):
+    """A term, and the share that it explains of the power that springs and dashpots leave of a missing force."""
+
+    term: AbstractTerm
+    share: float
 
 
 def scale_of(nuisances: Nuisances, structure: Structure) -> Scale:
@@ -83,9 +94,9 @@ def starts(structure: Structure, nuisances: Nuisances, most: int = 3, rounds: in
             others = [term for k, term in best.items() if k != i]
             found = place(law, latent, structure, scale, nuisances, others)
             if len(laws) == 1:
-                return [_with(structure, {id(law): term}) for term in found[:most]]
+                return [_with(structure, {id(law): start.term}) for start in found[:most]]
             if found:
-                best[i] = found[0]
+                best[i] = found[0].term
     return [_with(structure, {id(law): best[i] for i, law in enumerate(laws) if i in best})]
 
 
@@ -119,7 +130,7 @@ def place(
     others: Sequence[AbstractTerm] = (),
     sign: int = 0,
     sides: bool = False,
-) -> list[AbstractTerm]:
+) -> list[Placed]:
     """Terms of `law`'s class at its place, best first, that explain a missing force beside `others`.
 
     `sign` asks for that sign of the first number; a side stays as it is unless `sides` are to be tried.
@@ -131,6 +142,10 @@ def place(
     rows = _numbers(law, scale, sides)
     forces = np.concatenate([_forces(law, lot, structure, motion, len(chunk)) for chunk, lot in _lots(kind, rows)])
     beside = [np.asarray(force_along(lower(Structure(structure.mass, [t])), *motion)) for t in others]
+    stable = np.max(np.abs(forces), (1, 2)) < _RUN_AWAY * np.max(spread)  # false for what is no number, too
+    forces, rows = forces[stable], list(compress(rows, stable))
+    if not rows:
+        return []
     basis, doubt = _basis(latent, structure, beside)
     basis = basis / np.tile(spread, n)[:, None]
     wanted = (latent.force / spread).ravel()
@@ -140,12 +155,12 @@ def place(
     noise = np.sqrt(_CORRELATED * max(np.min(left @ left - beside_all), 1e-12 * wanted.size) / wanted.size)
     ridge = np.diag(noise / doubt)
     columns = np.hstack([columns, np.zeros((len(columns), len(ridge)))])
-    _, gain, size, columns = _regressed(
+    left, gain, size, columns = _regressed(
         columns, np.concatenate([wanted, np.zeros(len(ridge))]), np.vstack([basis, ridge])
     )
     power = np.maximum(np.sum(columns**2, 1), 1e-300)
     one_sign = all(p.positive for p in kind.parameters if p.force)
-    usable = np.isfinite(gain) & (power > 1e-12 * wanted.size)
+    usable = power > 1e-12 * wanted.size
     usable &= (size > _LEAST) if one_sign else (np.abs(size) > _LEAST)
     if sign:
         usable &= np.array([np.sign(s * next(iter(row.values()))) == sign for s, row in zip(size, rows, strict=True)])
@@ -157,7 +172,7 @@ def place(
         if all(abs(shape @ other) < _ALIKE for other in kept):
             kept.append(shape)
             numbers = {p.name: rows[k][p.name] * (size[k] if p.force else 1.0) for p in kind.parameters}
-            found.append(kind(**numbers, at=law.at))
+            found.append(Placed(kind(**numbers, at=law.at), float(gain[k] / (left @ left))))
     return found
 
 
