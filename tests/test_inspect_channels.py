@@ -4,12 +4,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from jfsm.records import Record, clipped, noise_floor
 from jfsm.records._coherence import coherence
 from jfsm.records._level import level
 from jfsm.records._noise_spectrum import noise_spectrum
 from jfsm.records._phase_plane import phase_plane
+from jfsm.records._quantisation import quantisation_step
 from jfsm.records._repeats import copies, longest_hold, repetition
 from jfsm.records._spectrum import spectrum
 
@@ -45,6 +47,37 @@ def test_slow_motion_widens_the_error_of_the_offset():
     assert level(slow, DT).offset_error > 10 * level(WAVE + white(1), DT).offset_error
 
 
+def pushed(seed):
+    """A force without bounds in frequency, and the displacement of an oscillator at 2 Hz that it moves."""
+    omega, zeta = 4.0 * np.pi, 0.03
+    pole = np.exp((-zeta + 1j * np.sqrt(1 - zeta**2)) * omega * DT)
+    force = np.convolve(white(seed, 1.0, N + 1007), np.hanning(8), "valid")
+    motion = np.asarray(lfilter([0.0, 1.0], [1.0, -2 * pole.real, abs(pole) ** 2], force))
+    return force[1000:], motion[1000:] / motion.std()
+
+
+def test_slow_motion_that_follows_the_force_does_not_hide_an_offset():
+    off = []
+    for seed in range(40):
+        force, motion = pushed(seed)
+        y = motion + 0.05 + white(seed + 100)
+        found = level(y, DT, [force])
+        off.append((found.offset - 0.05) / found.offset_error)
+        assert found.offset_error < 0.1 * level(y, DT).offset_error
+        assert level(y, DT, [white(seed + 200)]).offset == level(y, DT).offset  # what it does not follow
+    assert np.mean(np.abs(off) < 2.0) > 0.8  # six lines tell the error to a third
+    force, motion = pushed(1)
+    found = messages("info", displacement=motion + 0.05, force=force)
+    assert any(words.startswith(("Offset of 0.049", "Offset of 0.050")) for words in found)
+    assert not any(words.startswith("Offset") for words in messages("info", displacement=motion, force=force))
+
+
+def test_an_offset_of_the_force_is_not_laid_to_the_displacement():
+    force, motion = pushed(2)
+    y = motion + white(3)
+    assert level(y, DT, [force + 20.0 * force.std()]) == level(y, DT)
+
+
 def test_a_drift_is_said_with_its_size():
     (message,) = [words for words in messages("info", displacement=WAVE + 0.4 * T / T[-1]) if "Drifts" in words]
     assert "Drifts by 0.4001 ± 1e-06 m over the record, 50.3% of" in message
@@ -58,6 +91,12 @@ def test_a_sensor_that_hung_is_warned_of():
     assert any(
         "12 samples from sample 1200 on: the sensor hung" in words for words in messages("warning", displacement=y)
     )
+
+
+def test_a_sensor_that_hung_is_found_in_fine_steps_too():
+    y = np.round((WAVE + white(3)) / 1e-4) * 1e-4
+    y[1200:1212] = y[1200]
+    assert longest_hold(y) == (1200, 12)
 
 
 @pytest.mark.parametrize(
@@ -162,6 +201,49 @@ def test_the_error_of_the_noise_holds_the_truth(std):
         off.append((floor.std - noise.std()) / floor.std_error)
     assert np.mean(np.abs(off) < 2.0) >= 0.9
     assert np.abs(off).max() > 0.2  # an error as large as that would be no statement
+
+
+@pytest.mark.parametrize("reach", [0.4, 0.6, 0.8])
+@pytest.mark.parametrize("std", [0.001, 0.02])
+def test_the_error_of_the_noise_holds_the_truth_where_a_force_fills_the_band(reach, std):
+    lines = np.arange(1, int(reach * N / 2))
+    spectrum_ = np.zeros(N // 2 + 1, dtype=complex)
+    spectrum_[lines] = np.exp(2j * np.pi * np.random.default_rng(18).random(lines.size))
+    force = np.fft.irfft(spectrum_)
+    floor = noise_floor(force / force.std() + white(19, std), DT)
+    assert abs(floor.std - std) < 2.0 * floor.std_error
+
+
+@pytest.mark.parametrize("step", [1e-4, 1e-3, 0.02])
+def test_steps_are_found_however_fine_beside_the_motion(step):
+    y = np.round((WAVE + 3.0 + white(20)) / step)
+    for one in (y * step, (y * step).astype(np.float32).astype(float), y * step / 0.0254):
+        unit = step / 0.0254 if one[0] > 10 else step
+        assert quantisation_step(one) == pytest.approx(unit, rel=1e-3)
+    (message,) = [words for words in messages("info", displacement=y * step) if "Quantised" in words]
+    assert f"in steps of {step:.4g} m" in message
+
+
+@pytest.mark.parametrize(
+    "y",
+    [
+        WAVE + white(21),
+        (WAVE + white(21)).astype(np.float32),
+        np.linspace(0.0, 1.0, N),
+        np.concatenate([np.zeros(300), WAVE[:-300]]),
+        np.tile((WAVE + white(21))[:600], 5),
+        np.array([float(f"{value:.3g}") for value in WAVE + white(21)]),
+        np.arctan2(np.round(20 * WAVE), 50.0),
+    ],
+)
+def test_what_is_stored_in_few_digits_or_repeats_itself_is_not_quantised(y):
+    assert quantisation_step(np.asarray(y, dtype=float)) == 0.0
+
+
+def test_steps_that_do_nothing_beside_the_noise_are_not_mentioned():
+    y = np.round((WAVE + white(22, 0.1)) / 1e-4) * 1e-4
+    assert quantisation_step(y) > 0
+    assert not any("Quantised" in words for words in messages("info", displacement=y))
 
 
 def test_a_noisy_crest_cut_off_at_one_level_is_clipped_however_gently_it_comes_there():

@@ -175,6 +175,18 @@ def test_the_jumps_of_friction_are_no_spikes():
     assert found.sum() <= 2  # of some hundred jumps
 
 
+def test_the_crests_of_chatter_are_no_spikes_and_a_spike_beside_is_one():
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        y = OSCILLATORS[0.0]["displacement"] + 1e-4 * rng.standard_normal(3000)
+        for start in range(100, 2900, 140):
+            y[start : start + 12] += 0.02 * rng.standard_normal(12)
+        std = noise_floor(y, DT).std
+        assert spikes(y, std).sum() <= 1  # of 240 samples of chatter
+        y[[290, 1270, 2250]] += 0.5
+        assert spikes(y, std)[[290, 1270, 2250]].all()
+
+
 @pytest.mark.parametrize("kind", ["displacement", "velocity", "force"])
 def test_a_record_without_noise_has_no_spikes_where_friction_bends_it(kind):
     y = OSCILLATORS[0.5][kind]

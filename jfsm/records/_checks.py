@@ -1,6 +1,6 @@
 """What can be wrong with a record before any model is asked."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -22,6 +22,7 @@ DRIFT_SHARE = 0.1  # of the standard deviation: a drift over the record worth a 
 LEVEL_ERRORS = 4.0  # standard errors that offset and drift must have besides
 NOISY_SHARE = 0.1
 COARSE_SHARE = 0.1  # of the standard deviation: a quantisation step that shapes the signal
+FINE_SHARE = 0.01  # of the noise: a quantisation step that does nothing
 FEW_PER_PERIOD = 8.0
 FEWEST_PERIODS = 1.5  # between the first line of the spectrum, which any slow motion fills, and the second
 MOSTLY = 0.8  # share of the spikes that friction must account for
@@ -50,7 +51,8 @@ class ChannelSummary:
     noise, noise_error : float or None
         Noise floor and its standard error; None in a record too short to tell.
     level : Level or None
-        Offset and drift with their standard errors; None without a signal.
+        Offset and drift with their standard errors, of a displacement those that no drive explains; None without a
+        signal.
     quantisation : float
         Step between levels, 0 for a continuous channel.
     clipped, spikes : int
@@ -89,6 +91,7 @@ def examine(
     dt: float,
     floor: NoiseFloor | None,
     turning: NDArray[np.bool_] | None = None,
+    drives: Sequence[Samples] = (),
 ) -> tuple[ChannelSummary, list[Finding]]:
     """Figures and findings of one channel.
 
@@ -104,6 +107,8 @@ def examine(
         Of `uniform`; None if it is too short to have one.
     turning : (n,) bool array, optional
         Samples at which the velocity changes its sign, where friction makes an acceleration jump.
+    drives : (m,) float arrays, optional
+        What pushes a displacement to and fro, however slowly.
     """
     smooth = None if floor is None or floor.silent else floor.smooth
     raw = trace.samples
@@ -116,7 +121,7 @@ def examine(
         std=float(raw.std()),
         noise=None if floor is None else floor.std,
         noise_error=None if floor is None else floor.std_error,
-        level=None if smooth is None else level(uniform, dt),
+        level=None if smooth is None else level(uniform, dt, drives),
         quantisation=quantisation_step(raw),
         clipped=int(trace.clipped.sum()),
         spikes=int(trace.spikes.sum()),
@@ -168,7 +173,7 @@ def _of_samples(summary: ChannelSummary, raw: Samples) -> Iterator[Finding]:
             f"{summary.clipped} of {n} samples sit at the limit of {summary.minimum:.4g} or {summary.maximum:.4g} "
             f"{unit}: clipped. They carry no reading.",
         )
-    if summary.quantisation:
+    if summary.quantisation > FINE_SHARE * (summary.noise or 0.0):
         coarse = summary.quantisation > COARSE_SHARE * std
         steps = std / summary.quantisation
         message = f"Quantised in steps of {summary.quantisation:.4g} {unit}, {steps:.3g} to the standard deviation."

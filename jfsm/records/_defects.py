@@ -2,7 +2,7 @@
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import median_filter
+from scipy.ndimage import maximum_filter1d, median_filter
 
 from jfsm.records._quantisation import quantisation_step
 
@@ -15,6 +15,7 @@ VISITS, DISTINCT = 4, 0.99  # returns to the same level, and share of other valu
 SPIKE_ROBUST, SPIKE_FLOORS = 8.0, 6.0  # a spike is this many robust deviations and this many noise floors off
 SURROUNDING = 101  # samples in which the robust deviation is taken
 OUTSIDE = 0.75  # share of a spike's height that must stand out of the range of the samples beside it
+ALONE = 3.0  # times as far off as anything that is left around it: where a channel rattles, its crests are no spikes
 # A sample minus the quintic through its six neighbours; one sample, and two, from the quintic through those beside.
 OFF_CURVE = np.array([-1.0, 6.0, -15.0, 20.0, -15.0, 6.0, -1.0]) / 20.0
 BRIDGE_ONE = np.array([[1.0, -6.0, 15.0, 15.0, -6.0, 1.0]]) / 20.0
@@ -63,13 +64,16 @@ def spikes(y: ArrayLike, std: float) -> NDArray[np.bool_]:
     -------
     mask : (n,) bool array
         One sample or two side by side, off the running median of five by more than 6 floors, and off the quintic
-        through their neighbours by more than 8 robust standard deviations of the samples around.
+        through their neighbours by more than 8 robust standard deviations of the samples around, and by three times
+        what remains around it when the spikes are gone.
 
     Notes
     -----
     A jump, as dry friction leaves in an acceleration, is no spike: a spike stands out of the samples on both sides.
+    Nor is a crest among the like, as where a joint chatters.
     """
-    y = np.array(y, dtype=np.float64)
+    original = np.asarray(y, dtype=np.float64)
+    y = original.copy()
     mask = np.zeros(y.size, dtype=bool)
     if y.size < 2 * OFF_CURVE.size:
         return mask
@@ -81,7 +85,8 @@ def spikes(y: ArrayLike, std: float) -> NDArray[np.bool_]:
         for bridge, first in ((BRIDGE_ONE, i), (BRIDGE_TWO, i), (BRIDGE_TWO, i - 1)):
             if _bridged(y, first, bridge, float(limit[i])):
                 mask[first : first + len(bridge)] = True
-    return mask
+    height = maximum_filter1d(np.abs(original - y), 3)  # two side by side stand or fall together
+    return mask & (height > ALONE * maximum_filter1d(_off_curve(y), SURROUNDING))
 
 
 def _off_curve(y: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -128,12 +128,14 @@ def inspect(record: "Record") -> Inspection:
     readings: dict[str, Reading] = {}
     spectra, noise = [], []
     even = _every_channel(uniform)
+    pushing = [y for name, (_, y) in even.items() if name.startswith(("force", "base")) and record.drive == "force"]
     for channel, (unit, samples) in _every_channel(record).items():
         y = even[channel][1]
         floor = noise_floor(y, dt) if y.size >= SHORTEST else None
         traces.append(Trace.of(channel, unit, samples, floor))
         turning = _turning(record, channel) if channel.startswith("acceleration") else None
-        summaries[channel], found = examine(traces[-1], y, dt, floor, turning)
+        pushed_by = pushing if channel.startswith("displacement") else ()
+        summaries[channel], found = examine(traces[-1], y, dt, floor, turning, pushed_by)
         findings.extend(found)
         if floor is None or np.ptp(y) == 0:
             continue

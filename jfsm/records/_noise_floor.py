@@ -22,6 +22,7 @@ CORE_VARIANCE = 0.7737413035
 # estimates differ by. Two such errors hold the truth in 98 of 100 channels of oscillators, with friction in 95.
 SCATTER, DISAGREEMENT = 1.5, 0.7
 FARTHEST = 0.25  # share of the floor that counts of a disagreement: jumps spoil two estimates, not the third
+BANDS = 10  # of the spectrum; where a signal reaches into all but one of them, that one still shows the noise
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,7 @@ class NoiseFloor:
         Share of the channel's variance (about its mean) that is signal, 0 to 1.
     spacing : int
         Samples between knots. At the finest, 2, the signal fills the band and `std` may contain part of it.
+        `std_error` then reaches down to the quietest tenth of the spectrum.
     dt : float
         Sampling interval [s].
     std_error : float
@@ -117,12 +119,15 @@ def noise_floor(y: ArrayLike, dt: float) -> NoiseFloor:
         std = narrowest
     apart = min(max(middle, std) - narrowest, FARTHEST * std)
     total = float(np.var(y, ddof=1))
+    explained = max(0.0, 1.0 - variance / total) if total > 0 else 0.0
+    if spacing == SPACINGS[0] or explained < SILENCE:  # what is left may be signal
+        apart = max(apart, std - _quietest_std(y))
     smooth.flags.writeable = False
     return NoiseFloor(
         std=float(max(std, quantisation_step(y) / np.sqrt(12.0))),
         effective_parameters=parameters,
         smooth=smooth,
-        explained=max(0.0, 1.0 - variance / total) if total > 0 else 0.0,
+        explained=explained,
         spacing=spacing,
         dt=float(dt),
         std_error=float(np.hypot(SCATTER * std / np.sqrt(2.0 * freedom), DISAGREEMENT * apart)),
@@ -157,6 +162,13 @@ def _least_squares_spline(y: NDArray[np.float64], spans: int) -> NDArray[np.floa
         if offset >= 0:
             bands[DEGREE - offset] = diagonal
     return basis @ solveh_banded(bands, basis.T @ y)
+
+
+def _quietest_std(y: NDArray[np.float64]) -> float:
+    """Standard deviation of white noise as strong as the quietest tenth of the spectrum."""
+    taper = np.hanning(y.size)
+    power = np.abs(np.fft.rfft(taper * (y - y.mean()))) ** 2 / (taper @ taper)
+    return float(np.sqrt(min(band.mean() for band in np.array_split(power, BANDS))))
 
 
 def _core_std(sample: NDArray[np.float64]) -> float:

@@ -20,12 +20,12 @@ def longest_hold(y: Samples) -> tuple[int, int]:
     """First sample and length of the longest run of equal values inside a continuous channel; 0 and 0 without one.
 
     Runs at the start and the end are rest, and so are those that the channel comes to and leaves gently, as a joint
-    that sticks does where it turns; those at the extreme values are clipping. A quantised channel repeats its values
-    anyway, and so does one that was computed from such a channel: a run must be longer than the short ones let expect.
-    A channel that mostly holds is switched in steps.
+    that sticks does where it turns; those at the extreme values are clipping. A coarsely quantised channel repeats its
+    values anyway, and so does one that was computed from such a channel: a run must be longer than the short ones let
+    expect. A channel that mostly holds is switched in steps.
     """
     same = np.diff(y) == 0
-    if quantisation_step(y) or repetition(y) > 1:
+    if quantisation_step(y) > GENTLE * _usual_step(y) or repetition(y) > 1:
         return 0, 0
     edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int)))
     starts, ends = edges[::2], edges[1::2] + 1
@@ -50,8 +50,13 @@ def _gentle(y: Samples, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> N
     Of a displacement both steps are small beside the usual step; a velocity is 0 then, and was small before.
     """
     step = np.maximum(np.abs(y[starts] - y[starts - 1]), np.abs(y[ends] - y[ends - 1]))
-    slow = step <= GENTLE * np.sqrt(np.mean(np.diff(y) ** 2))
+    slow = step <= GENTLE * _usual_step(y)
     return slow | ((y[starts] == 0) & (step <= GENTLE * y.std()))
+
+
+def _usual_step(y: Samples) -> float:
+    """Root mean square of the differences between neighbouring samples."""
+    return float(np.sqrt(np.mean(np.diff(y) ** 2)))
 
 
 def repetition(y: Samples) -> int:
