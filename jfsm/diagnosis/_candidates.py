@@ -43,7 +43,7 @@ SOUGHT = (
 """Causes that are looked for unless others are asked for."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Candidate:
     """A cause at a place; `starts` are the structures that a fit begins from.
 

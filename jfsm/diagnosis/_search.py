@@ -1,11 +1,12 @@
 """Every hypothesis fitted: those that share a program side by side, the hopeless ones only so far."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from ..identification import Maximum, Nuisances, Posterior, approach, finish, lanes_of
+from ..identification import LANES, Maximum, Nuisances, Posterior, approach, finish, lanes_of, rungs
 from ..structures import Structure
 from ._candidates import Candidate, hypothesis
 from ._trial import Trial, trial
@@ -16,19 +17,47 @@ _FAR_BEHIND = 200.0
 """Nats behind the leader, one per cent of unmodelled force forgiven, from which a candidate is not pursued,"""
 _ALWAYS_PURSUED = 3
 """unless it is among the best of them."""
+_STILL_OPEN = 6
+"""Lots that go on after an early rung, at least; half of them in any case."""
 
 
-@dataclass(frozen=True)
-class _Approached:
-    """Starts of one law, brought to the last rung that forgives unmodelled force."""
+Beginning = tuple[Candidate, Structure, Mapping[str, float] | None]
+"""A candidate, the structure with the size of its effect, and the own values to begin with (None: as given)."""
 
-    candidates: tuple[Candidate, ...]
-    posterior: Posterior
-    rung: Maximum
+
+class _Lot:
+    """Starts of one law on their way up, side by side."""
+
+    def __init__(self, beginnings: Sequence[Beginning], model: Structure, records: Sequence[Nuisances], until):
+        candidates, starts, begins = zip(*beginnings, strict=True)
+        records = [n.resolving(starts) for n in records]
+        lanes = lanes_of(starts[0])
+        posteriors = [
+            Posterior(hypothesis(model, starts[i : i + lanes], records, begins=begins[i : i + lanes]), records, until)
+            for i in range(0, len(starts), lanes)
+        ]
+        # Where one climbs alone it is the one that begins best.
+        best = 0
+        if len(posteriors) > 1:
+            best = int(np.argmin([np.min(p.evaluate(p.initial(), _LADDER[0])[0]) for p in posteriors]))
+        self.posterior = posteriors[best]
+        self.candidates: tuple[Candidate, ...] = candidates[best * lanes :][:lanes]
+        self.climb, self.behind = rungs(self.posterior, _LADDER), 0.0
+
+    def step(self) -> None:
+        """On to the next rung."""
+        self.rung = next(self.climb)
 
     @property
     def best(self) -> float:
         return float(np.min(self.rung.value))
+
+    def trials(self, found: Maximum) -> Iterator[Trial]:
+        """The best start of each candidate as a trial."""
+        for one in dict.fromkeys(self.candidates):
+            lanes = [lane for lane, candidate in enumerate(self.candidates) if candidate is one]
+            lane = min(lanes, key=lambda lane: found.value[lane])
+            yield trial(self.posterior, found, lane, one.cause, one.at, float(self.rung.value[lane]))
 
 
 def fit_model(name: str, model: Structure, records: Sequence[Nuisances], until: Sequence[int], *, refit: bool) -> Trial:
@@ -46,26 +75,19 @@ def fit_model(name: str, model: Structure, records: Sequence[Nuisances], until: 
     return trial(posterior, found, best, None, (name,), float(rung.value[0]))
 
 
-Beginning = tuple[Candidate, Structure, Mapping[str, float] | None]
-"""A candidate, the structure with the size of its effect, and the own values to begin with (None: as given)."""
-
-
 def groups(tried: Sequence[Candidate], own: Mapping[str, float] | None) -> list[list[Beginning]]:
     """Starts that can share a program, in lots of its lanes: one law, whatever its sign and place.
 
     A law starts twice, from the own values as given and from those of the refit: either may be far from what is right
     beside it. A gain lies on a ridge with the own values, and only a climb from those as given ends at its own end.
     """
-    by_law: dict[type, list[Beginning]] = {}
+    by_law: dict[tuple, list[Beginning]] = {}
     for candidate in tried:
         begins = [None] if candidate.cause.is_sensor or own is None else [None, own]
-        lot = by_law.setdefault(candidate.cause.effect, [])
+        alone = lanes_of(candidate.starts[0]) == 1  # all starts of one candidate then, of which one climbs
+        lot = by_law.setdefault((candidate.cause.effect, id(candidate) if alone else None), [])
         lot += [(candidate, s, begin) for begin in begins for s in candidate.starts]
-    lots = []
-    for starts in by_law.values():
-        lanes = lanes_of(starts[0][1])
-        lots += [starts[i : i + lanes] for i in range(0, len(starts), lanes)]
-    return lots
+    return [lot[i : i + LANES] for lot in by_law.values() for i in range(0, len(lot), LANES)]
 
 
 def search(
@@ -78,36 +100,41 @@ def search(
     tell: Callable[[str, int], None],
 ) -> list[Trial]:
     """The best trial of every candidate; those far behind stay at the values of their rung."""
-    approached = []
     values = refitted.structure.values()
     own = {p: values[p] for p in model.entries()} if refitted.evidence > given.evidence else None
-    lots = groups(tried, own)
-    for lot in lots:
+    lots = []
+    beginnings = groups(tried, own)
+    for lot in beginnings:
         first = lot[0][0]
-        tell(f"{first.cause.label} at {'-'.join(map(str, first.at))}", 2 * len(lots))
-        approached.append(_approach(lot, model, records, until))
-    leader = min([refitted.rung, *(lot.best for lot in approached)])
+        tell(f"{first.cause.label} at {'-'.join(map(str, first.at))}", 2 * len(beginnings))
+        lots.append(_Lot(lot, model, records, until))
+        lots[-1].step()
+    pursued = lots
+    for _ in _LADDER[1:]:
+        pursued = _near(pursued, max(_STILL_OPEN, len(pursued) // 2))
+        for lot in pursued:
+            lot.step()
+    pursued = _near(pursued, _ALWAYS_PURSUED, refitted.rung)
     trials, best = [], refitted.value
-    for rank, lot in enumerate(sorted(approached, key=lambda lot: lot.best)):
-        tell("the best candidates", 2 * len(lots))
-        behind = lot.best - leader
-        pursued = rank < _ALWAYS_PURSUED or behind < _FAR_BEHIND
-        found = finish(lot.posterior, lot.rung, best=best) if pursued else lot.rung
-        for lane, candidate in enumerate(lot.candidates):
-            done = trial(lot.posterior, found, lane, candidate.cause, candidate.at, float(lot.rung.value[lane]))
-            if pursued:
-                best = min(best, done.value)
-            else:
-                done = replace(done, evidence=refitted.evidence - behind, converged=False)
-            trials.append(done)
+    for lot in sorted(lots, key=lambda lot: lot.behind):
+        tell("the best candidates", 2 * len(beginnings))
+        if lot not in pursued:
+            found = lot.trials(lot.rung)
+            trials += [replace(t, evidence=refitted.evidence - lot.behind, converged=False) for t in found]
+            continue
+        done = list(lot.trials(finish(lot.posterior, lot.rung, best=best)))
+        best = min([best, *(t.value for t in done)])
+        trials += done
     return _best_of_each(trials)
 
 
-def _approach(lot: Sequence[Beginning], model: Structure, records, until) -> _Approached:
-    candidates, starts, begins = zip(*lot, strict=True)
-    records = [n.resolving(starts) for n in records]
-    posterior = Posterior(hypothesis(model, starts, records, begins=begins), records, until)
-    return _Approached(candidates, posterior, approach(posterior, _LADDER))
+def _near(lots: Sequence[_Lot], least: int, leader: float = math.inf) -> list[_Lot]:
+    """Those that are not hopelessly behind after the same rung, or among the `least` best."""
+    leader = min([leader, *(lot.best for lot in lots)])
+    for lot in lots:
+        lot.behind = lot.best - leader
+    ranked = sorted(lots, key=lambda lot: lot.behind)
+    return [lot for rank, lot in enumerate(ranked) if rank < least or lot.behind < _FAR_BEHIND]
 
 
 def _best_of_each(trials: Sequence[Trial]) -> list[Trial]:

@@ -7,8 +7,10 @@ from ._maximise import Maximum as Maximum
 from ._maximise import approach as approach
 from ._maximise import finish as finish
 from ._maximise import maximise as maximise
+from ._maximise import rungs as rungs
 from ._nuisances import Nuisances as Nuisances
 from ._nuisances import prepare as prepare
+from ._posterior import LANES as LANES
 from ._posterior import Hypothesis as Hypothesis
 from ._posterior import Posterior as Posterior
 from ._posterior import lanes_of as lanes_of

@@ -1,6 +1,6 @@
 """Levenberg-Marquardt on the posterior, several starts side by side."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -50,10 +50,18 @@ def approach(posterior: Posterior, ladder: Sequence[float] = LADDER, theta: np.n
     From the true noise alone, a period wrong by some per cent scores worse than no motion at all, and a climb ends
     there.
     """
+    *_, last = rungs(posterior, ladder, theta)
+    return last
+
+
+def rungs(posterior: Posterior, ladder: Sequence[float] = LADDER, theta: np.ndarray | None = None) -> Iterator[Maximum]:
+    """What `approach` stands on after each rung."""
     theta = posterior.initial() if theta is None else theta
     for share in ladder[:-1]:
-        theta = _climb(posterior, theta, share, _RUNG_STEPS, _RUNG_ENOUGH, most=_RUNG_SAMPLES).theta
-    return _climb(posterior, theta, ladder[-1], _LAST_RUNG_STEPS, _RUNG_ENOUGH, most=_RUNG_SAMPLES)
+        found = _climb(posterior, theta, share, _RUNG_STEPS, _RUNG_ENOUGH, most=_RUNG_SAMPLES)
+        yield found
+        theta = found.theta
+    yield _climb(posterior, theta, ladder[-1], _LAST_RUNG_STEPS, _RUNG_ENOUGH, most=_RUNG_SAMPLES)
 
 
 def finish(posterior: Posterior, start: Maximum, steps: int = 25, best: float = np.inf) -> Maximum:
