@@ -44,6 +44,9 @@ def _option(text: str, metavar: str | None = None, panel: str | None = None) -> 
 _CHANNELS = "Channels of the record"
 Names = Annotated[list[str] | None, _option("Name in the file; once per degree of freedom.", "[DOF=]NAME", _CHANNELS)]
 Units = Annotated[list[str] | None, _option("Unit of a channel, as y=mm; once per channel.", "NAME=UNIT", _CHANNELS)]
+Where = Annotated[
+    list[str] | None, _option("Rows of a long table to take, as run=3; once per column.", "NAME=VALUE", _CHANNELS)
+]
 Rate = Annotated[float | None, _option("Samples per second of a file without a clock.", "HZ", _CHANNELS)]
 ModelFile = Annotated[Path, _option("The model that is believed, as TOML.")]
 Seed = Annotated[int | None, _option("Seed of the few random draws; without it, another one every time.")]
@@ -92,6 +95,7 @@ class RecordFile:
     time: Annotated[str | None, _option("Name of the column of instants.", "NAME", _CHANNELS)] = None
     rate: Rate = None
     unit: Units = None
+    where: Where = None
     at_rest: Annotated[
         bool, typer.Option("--at-rest", help="At rest at the first sample.", rich_help_panel=_CHANNELS)
     ] = False
@@ -111,6 +115,7 @@ class RecordFile:
                 time=self.time,
                 rate=self.rate,
                 units=_units(self.unit),
+                where=_where(self.where),
                 at_rest=self.at_rest or None,  # without the option, what the file says
             )
         except TypeError as error:  # from what the file holds; a TypeError of any later step is a mistake of ours
@@ -397,6 +402,22 @@ def _units(given: Sequence[str] | None) -> dict[str, str] | None:
         if not (name and unit):
             raise ValueError(f"--unit must be a channel and its unit, as y=mm; it was {name or unit!r}.")
     return {name: unit for name, _, unit in pairs} or None
+
+
+def _where(given: Sequence[str] | None) -> dict[str, str | float] | None:
+    """Values by column, from ``run=3`` and ``specimen=B``; what can be a number is one."""
+    found: dict[str, str | float] = {}
+    for text in given or ():
+        name, _, value = text.partition("=")
+        if not (name and value) or name in found:
+            raise ValueError(
+                f"--where must be a column and its value, as run=3, each column once; it was {', '.join(given or ())}."
+            )
+        try:
+            found[name] = float(value)
+        except ValueError:
+            found[name] = value
+    return found or None
 
 
 def _holdout(text: str, source: RecordFile) -> "float | Record | None":

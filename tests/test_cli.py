@@ -264,6 +264,12 @@ def test_an_unknown_channel_is_named_beside_those_that_exist(folder):
         (["--displacement", "y", "--unit", "mm"], "--unit must be a channel and its unit, as y=mm; it was 'mm'."),
         (["--displacement", "y", "--unit", "=mm"], "--unit must be a channel and its unit, as y=mm; it was 'mm'."),
         (["--displacement", "y", "--unit", "y=parsec"], "it was 'parsec'"),
+        (
+            ["--displacement", "y", "--where", "t"],
+            "--where must be a column and its value, as run=3, each column once; it was t.",
+        ),
+        (["--displacement", "y", "--where", "t=0", "--where", "t=1"], "each column once; it was t=0, t=1."),
+        (["--displacement", "y", "--where", "run=3"], "`where` must name a channel of run.csv"),
         (["--displacement", "0=y"], "dof"),
         ([], "must be told which channel is what"),
     ],
@@ -519,3 +525,12 @@ def test_a_process_needs_no_setting_beforehand(channels, folder, tmp_path):
     )  # fmt: skip
     assert (finished.returncode, finished.stderr) == (0, "")
     assert len(read(out)) == SAMPLES
+
+
+def test_one_run_is_taken_out_of_a_long_table(tmp_path):
+    time = np.arange(200) / 100
+    rows = [f"B,{k},{t:.2f},{k * math.sin(9 * t):.6f}" for k in (1, 2) for t in time]
+    path = tmp_path / "campaign.csv"
+    path.write_text("specimen,run,t,y\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    told = flat(run("inspect", path, "--displacement", "y", "--where", "run=2", "--where", "specimen=B").output)
+    assert "Rows with run = 2.0 and specimen = B: 200 of 400." in told

@@ -9,6 +9,7 @@ import jfsm
 from jfsm.estimation._kalman import LinearModel, log_likelihood, smoothed
 
 DT = 0.04
+KINDS = ("displacement", "velocity", "acceleration")
 TIME = DT * np.arange(1500)
 
 
@@ -57,6 +58,7 @@ def test_what_was_not_measured_is_found_from_what_was(hardening, kinds, largest)
     for place, truth in enumerate(hardening):
         shown = (found.displacement, found.velocity, found.acceleration)[place][:, 0]
         assert 0.85 < np.mean(np.abs(shown - truth) < 1.96 * found.std[:, 0, place])
+    assert found.drift == {}  # a drift that is not there is not bought
     for kind in kinds:
         assert found.noise[kind][0] == pytest.approx(0.01 * np.std(hardening[names.index(kind)]), rel=0.2)
 
@@ -67,6 +69,21 @@ def test_a_bias_of_an_accelerometer_moves_nothing_and_is_told(hardening):
     found = jfsm.estimate_motion(record)
     assert found.bias["acceleration", 1] == pytest.approx(bias, rel=0.1)
     assert errors(found, hardening)[0] < 0.07
+
+
+@pytest.mark.parametrize(("slow", "kinds"), [("ramp", KINDS[2:]), ("walk", KINDS)])
+def test_a_drift_of_an_accelerometer_moves_nothing_and_is_told(hardening, slow, kinds):
+    walk = np.cumsum(np.random.default_rng(5).standard_normal(TIME.size))
+    drift = {"ramp": np.linspace(-1, 1, TIME.size), "walk": walk - np.mean(walk)}[slow]
+    drift *= 0.15 * np.std(hardening[2]) / np.std(drift)
+    channels = {kind: noisy(hardening[KINDS.index(kind)], 0.01, KINDS.index(kind)) for kind in kinds}
+    channels["acceleration"] = channels["acceleration"] + drift
+    found = jfsm.estimate_motion(jfsm.Record(TIME, noisy(force(TIME), 0.01, 9), **channels))
+    assert list(found.drift) == [("acceleration", 1)]
+    assert np.all(np.array(errors(found, hardening)) < (0.08, 0.03, 0.02))
+    miss, std = found.drift["acceleration", 1] - drift, found.drift_std["acceleration", 1]
+    assert np.std(miss) < 0.2 * np.std(drift)
+    assert np.mean(np.abs(miss) < 1.96 * std) > 0.9
 
 
 def test_a_model_tells_the_motion_of_a_mass_that_nothing_measures():
@@ -135,3 +152,26 @@ def test_a_record_that_tells_no_motion_is_refused(hardening):
     uneven = np.cumsum(np.random.default_rng(0).uniform(0.01, 0.03, 600))
     with pytest.raises(ValueError, match=r"Make them so first: record\.resample"):
         jfsm.estimate_motion(jfsm.Record(uneven, displacement=hardening[0, :600]))
+
+
+def test_the_missing_force_is_known_as_well_as_its_error_bar_says(hardening):
+    channels = {kind: noisy(y, 0.01, i) for i, (kind, y) in enumerate(zip(KINDS, hardening, strict=True))}
+    record = jfsm.Record(TIME, noisy(force(TIME), 0.01, 9), **channels)
+    linear = jfsm.Structure.sdof(mass=1.0, stiffness=4.0, damping=0.15)
+    truth = 0.3 * hardening[0] ** 3
+    # What the model has of it is taken off, and what its argument's error makes of it is in the error bar.
+    for model, missing in ((linear, truth), (linear + jfsm.CubicStiffness(0.2, at=(0, 1)), truth / 3)):
+        found = jfsm.estimate_motion(record, model)
+        assert found.places == ((0, 1),) and found.latent_force is not None and found.latent_force_std is not None
+        miss = found.latent_force[:, 0] - missing
+        assert 0.8 < np.sqrt(np.mean((miss / found.latent_force_std[:, 0]) ** 2)) < 1.25
+        assert np.std(miss) < 0.05 * np.std(truth)
+
+
+def test_what_the_model_says_of_its_sensors_is_undone(hardening):
+    channels = {kind: noisy(y, 0.01, i) for i, (kind, y) in enumerate(zip(KINDS, hardening, strict=True))}
+    channels["acceleration"] = 1.1 * channels["acceleration"]
+    model = jfsm.Structure.sdof(mass=1.0, stiffness=4.0, damping=0.15)
+    model = model + jfsm.AccelerationGain(0.1, at=("acceleration", 1))
+    found = jfsm.estimate_motion(jfsm.Record(TIME, noisy(force(TIME), 0.01, 9), **channels), model)
+    assert errors(found, hardening)[2] < 0.008

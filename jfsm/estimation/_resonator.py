@@ -1,9 +1,9 @@
 r"""A resonator with a random force, as a linear model on the grid of a record.
 
-    ẍ = -K x - C ẋ + B (g + e) - r,     y = (x, v, ẍ) + bias + noise
+    ẍ = -K x - C ẋ + B (g + e) - L r,     y = (x, v, ẍ) + bias + noise
 
-g is the measured force and e its white noise. The random force r is a process of Matérn's family with ν = p + 1/2,
-which has p derivatives (none or two); its variance may swell and fade along the record.
+g is the measured force and e its white noise. The random forces r are processes of Matérn's family with ν = p + 1/2,
+which have p derivatives (none or two); their variance may swell and fade along the record. A bias may wander.
 """
 
 import math
@@ -25,26 +25,30 @@ class Kind(NamedTuple):
     """What a compiled program is made for.
 
     `channels` are the order of differentiation and the index of the degree of freedom of each; `learned` tells whether
-    stiffness, damping and gains are among the numbers; `smoothness` is how many derivatives the random force has.
+    stiffness, damping and gains are among the numbers; `loads` is the number of random forces, `alike` whether they
+    have one size, `smoothness` how many derivatives they have.
     """
 
     channels: tuple[tuple[int, int], ...]
     dof: int
     inputs: int
     learned: bool
+    loads: int
+    alike: bool
     smoothness: int
 
     @property
     def biased(self) -> tuple[int, ...]:
-        """Channels that may show a constant beside the motion."""
+        """Channels that may show a constant, or something slow, beside the motion."""
         return tuple(i for i, (order, _) in enumerate(self.channels) if order > 0)
 
 
 class Numbers(NamedTuple):
     """What is learned; logarithms but for `gain`, in units of the motion's size and rate.
 
-    Stiffness, damping and gains of the measured forces; memory and size of the random force; noise of the measured
-    forces, of the velocity over a step (what forces do between samples), and of the channels.
+    Stiffness, damping and gains of the measured forces; memory and size of the random forces; noise of the measured
+    forces, of the velocity over a step (what forces do between samples), and of the channels; how far each bias
+    wanders in a radian of the motion.
     """
 
     stiffness: Any
@@ -55,14 +59,19 @@ class Numbers(NamedTuple):
     force: Any
     between: Any
     noise: Any
+    drift: Any
 
     @classmethod
     def unpacked(cls, theta: Array, kind: Kind) -> "Numbers":
         """The numbers from one vector."""
         free = kind.dof if kind.learned else 0
-        sizes = (free, free, free * kind.inputs, 1, kind.dof, kind.inputs, kind.dof, len(kind.channels))
-        k, c, gain, memory, size, force, between, noise = jnp.split(theta, np.cumsum(sizes)[:-1].tolist())
-        return cls(k, c, gain.reshape(free, kind.inputs), memory[0], size, force, between, noise)
+        sizes = (
+            free, free, free * kind.inputs, 1, 1 if kind.alike else kind.loads, kind.inputs, kind.dof,
+            len(kind.channels), len(kind.biased),
+        )  # fmt: skip
+        k, c, gain, memory, size, force, between, noise, drift = jnp.split(theta, np.cumsum(sizes)[:-1].tolist())
+        size = jnp.broadcast_to(size, (kind.loads,))
+        return cls(k, c, gain.reshape(free, kind.inputs), memory[0], size, force, between, noise, drift)
 
     @property
     def packed(self) -> np.ndarray:
@@ -70,8 +79,9 @@ class Numbers(NamedTuple):
 
 
 class Data(NamedTuple):
-    """Readings, which of them count, measured forces, the base, the swelling of the random force's variance; the step,
-    the standard deviation of the first state, and what is used where it is not learned."""
+    """Readings, which of them count, measured forces, the base, the swelling of the random forces' variance; the step,
+    the standard deviation of the first state, where the random forces act, and what is used where it is not learned.
+    """
 
     seen: Float[Array, "n channels"]
     use: Float[Array, "n channels"]
@@ -80,6 +90,7 @@ class Data(NamedTuple):
     swell: Float[Array, " n"]
     step: Float[Array, ""]
     first: Float[Array, ""]
+    lever: Float[Array, "dof loads"]
     stiffness: Float[Array, "dof dof"]
     damping: Float[Array, "dof dof"]
     gain: Float[Array, "dof inputs"]
@@ -96,7 +107,7 @@ class _Built(NamedTuple):
 def _matern(smoothness: int, size, tau):
     """Rate matrix of a Matérn process and its derivatives, density of the noise that drives the last, and covariance.
 
-    It has none or two derivatives; they are blocks of dof, and `size` (dof,) is its standard deviation.
+    It has none or two derivatives; they are blocks of loads, and `size` (loads,) is its standard deviation.
     J. Hartikainen, S. Särkkä, IEEE MLSP 2010.
     """
     p, eye = smoothness, jnp.eye(size.size)
@@ -120,7 +131,7 @@ def _built(numbers: Numbers, gain, data: Data, kind: Kind) -> _Built:
     memory, density, stationary = _matern(kind.smoothness, jnp.exp(numbers.size), jnp.exp(numbers.memory))
     n, biased, forces = 2 * dof + len(memory), len(kind.biased), kind.inputs
     total = n + biased + forces
-    pull = jnp.concatenate([-k, -c, -eye, jnp.zeros((dof, n - 3 * dof))], 1)
+    pull = jnp.concatenate([-k, -c, -data.lever, jnp.zeros((dof, n - 2 * dof - kind.loads))], 1)
     a = jnp.zeros((n, n)).at[:dof, dof : 2 * dof].set(eye).at[2 * dof :, 2 * dof :].set(memory)
     a = a.at[dof : 2 * dof].set(pull)
     # C. F. Van Loan, IEEE Trans. Autom. Control 23 (1978) 395-404: the covariance that a step adds.
@@ -134,6 +145,7 @@ def _built(numbers: Numbers, gain, data: Data, kind: Kind) -> _Built:
     held = held.at[n : n + dof, n + dof : n + 2 * dof].set(eye).at[n + dof : n + 2 * dof, n + 2 * dof :].set(eye)
     enter = jax.scipy.linalg.expm(held)[:n, n:]
     between = jnp.zeros(total).at[dof : 2 * dof].set(jnp.exp(2 * numbers.between))
+    between = between.at[n : n + biased].set(dt * jnp.exp(2 * numbers.drift))
     fresh = jnp.diag(jnp.exp(2 * numbers.force))
     shown = jnp.zeros((3, dof, total)).at[0, :, :dof].set(eye).at[1, :, dof : 2 * dof].set(eye)
     shown = shown.at[2, :, :n].set(pull).at[2, :, n + biased :].set(gain)
@@ -153,7 +165,7 @@ def _built(numbers: Numbers, gain, data: Data, kind: Kind) -> _Built:
         wander=jnp.zeros((total, total)).at[:n, :n].set((added + added.T) / 2),
     )  # fmt: skip
     watch = jnp.concatenate([shown.transpose(1, 0, 2).reshape(3 * dof, total), jnp.eye(total)[n : n + biased]])
-    watch = jnp.concatenate([watch, jnp.eye(total)[2 * dof : 3 * dof]])
+    watch = jnp.concatenate([watch, jnp.eye(total)[2 * dof : 2 * dof + kind.loads]])
     return _Built(linear, jnp.pad(enter, ((0, total - n), (0, 0))), watch)
 
 
@@ -193,7 +205,7 @@ def cost(theta: Array, data: Data, centre: Array, width: Array, *, kind: Kind):
 
 @partial(jax.jit, static_argnames="kind")
 def motion(theta: Array, data: Data, *, kind: Kind):
-    """Mean and covariance of (x, v, a) of every degree of freedom, then of the biases, then of the random force."""
+    """Mean and covariance of (x, v, a) of every degree of freedom, then of the biases, then of the random forces."""
     d = _driven(theta, data, kind)
     mean, covariance = smoothed(d.built.linear, d.pushed, d.seen, data.use, d.built.watch, data.swell)
     return mean.at[:, 2 : 3 * kind.dof : 3].add(d.push), covariance
