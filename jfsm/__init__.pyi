@@ -74,3 +74,9 @@ from .structures import Structure as Structure
 from .structures import VanDerPol as VanDerPol
 from .structures import causes as causes
 from .surrogates import RKPM as RKPM
+from .surrogates import Discontinuity as Discontinuity
+from .surrogates import MovingLeastSquares as MovingLeastSquares
+from .surrogates import Plane as Plane
+from .surrogates import Polynomial as Polynomial
+from .surrogates import RadialBasis as RadialBasis
+from .surrogates import find_discontinuities as find_discontinuities

@@ -1,5 +1,6 @@
 """Reproducing kernel particle method: polynomials reproduced exactly from scattered readings."""
 
+from .interfaces import Plane as Plane
 from .rkpm import RKPM as RKPM
 from .shape_functions import shape_functions as shape_functions
 from .windows import AbstractWindow as AbstractWindow

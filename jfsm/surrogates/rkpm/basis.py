@@ -4,7 +4,7 @@ import functools
 import itertools
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -42,6 +42,22 @@ def monomial_columns(coordinates: Sequence[Float[Array, "*shape"]], order: int) 
 def monomials(z: Float[Array, "*points dim"], order: int) -> Float[Array, "*points basis"]:
     """H(z): all monomials up to `order` at points given in the last axis, in the order of `multi_indices`."""
     return jnp.stack(monomial_columns([z[..., axis] for axis in range(z.shape[-1])], order), axis=-1)
+
+
+def chebyshev_polynomials(z: Any, order: int) -> Any:
+    """Products of Chebyshev polynomials up to a total order, (*points, basis), in the order of `multi_indices`.
+
+    `z` (*points, dim) lies in [-1, 1]; a NumPy array gives one, a JAX array the other.
+    """
+    xp = np if isinstance(z, np.ndarray) else jnp
+    t = [xp.ones_like(z), z]
+    while len(t) <= order:
+        t.append(2.0 * z * t[-1] - t[-2])
+    columns = []
+    for exponents in multi_indices(z.shape[-1], order):
+        factors = [t[e][..., axis] for axis, e in enumerate(exponents) if e]
+        columns.append(math.prod(factors[1:], start=factors[0]) if factors else t[0][..., 0])
+    return xp.stack(columns, axis=-1)
 
 
 class DerivativeTargets(NamedTuple):

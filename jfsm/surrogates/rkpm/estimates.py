@@ -8,9 +8,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .basis import DerivativeTargets, basis_size
+from .interfaces import Interface, region
 from .nodes import Nodes
 from .shape_functions import LocalBasis, local_basis
-from .support import choose_dilation, gathered_nodes
+from .support import BEYOND, choose_dilation, gathered_nodes
 from .windows import AbstractWindow
 
 SINGULAR = 1e-12
@@ -23,6 +24,10 @@ class Rule(eqx.Module):
     window: AbstractWindow
     order: int = eqx.field(static=True)
     neighbours: int = eqx.field(static=True)
+    dilation: Float[Array, ""]
+    """Dilation over that at which `neighbours` nodes fill the support, 1 at most."""
+    across: tuple[Interface, ...] = ()
+    """Interfaces that no neighbourhood crosses."""
 
 
 class Neighbourhood(NamedTuple):
@@ -34,11 +39,19 @@ class Neighbourhood(NamedTuple):
 
 
 def nearest_nodes(nodes: Nodes, rule: Rule, state: Float[Array, " dim"]) -> Neighbourhood:
-    """Neighbours of one state by brute force over all nodes: traceable, O(nodes)."""
+    """Neighbours of one state by brute force over all nodes of its region: traceable, O(nodes)."""
     offsets = jax.lax.stop_gradient((state[None, :] - nodes.states) / nodes.scale[None, :])
-    near = gathered_nodes(rule.neighbours, len(nodes))
-    _, chosen = jax.lax.top_k(-jnp.sum(offsets**2, axis=1), near)
-    return Neighbourhood(nodes.states[chosen], nodes.force[chosen], nodes.multiplicity[chosen])
+    squared = jnp.sum(offsets**2, axis=1)
+    if rule.across:  # I_Ω of eq. 48
+        home = jax.vmap(lambda node: region(node, rule.across))(nodes.states) == region(state, rule.across)
+        squared = jnp.where(home, squared, jnp.inf)
+    least, chosen = jax.lax.top_k(-squared, gathered_nodes(rule.neighbours, len(nodes)))
+    states = nodes.states[chosen]
+    if rule.across:  # where the region has no more nodes, the rest stands at the edge of the support and weighs nothing
+        inside = jnp.isfinite(least)
+        farthest = states[jnp.maximum(jnp.sum(inside) - 1, 0)]
+        states = jnp.where(inside[:, None], states, (state + BEYOND * (farthest - state))[None, :])
+    return Neighbourhood(states, nodes.force[chosen], nodes.multiplicity[chosen])
 
 
 def basis_at(near: Neighbourhood, scale: Float[Array, " dim"], rule: Rule, state: Float[Array, " dim"]) -> LocalBasis:
@@ -49,6 +62,7 @@ def basis_at(near: Neighbourhood, scale: Float[Array, " dim"], rule: Rule, state
         neighbours=rule.neighbours,
         order=rule.order,
         window=rule.window,
+        factor=rule.dilation,
     )
     return local_basis(
         state, near.states, a * scale, order=rule.order, window=rule.window, multiplicity=near.multiplicity

@@ -1,5 +1,6 @@
 """Many states: neighbours from a tree on the host, Cholesky where it is safe, QR where it is not."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import equinox as eqx
@@ -14,6 +15,7 @@ from scipy.spatial import KDTree
 from .._blocks import padded_blocks
 from .basis import DerivativeTargets, basis_size
 from .estimates import SINGULAR, Neighbourhood, Rule, basis_at, degenerate_message, derivatives_at
+from .interfaces import regions
 from .moments import moment_estimates
 from .nodes import Nodes
 from .support import gathered_nodes
@@ -36,19 +38,50 @@ def evaluate_many(
     RuntimeError
         If the nodes around some state are in degenerate position.
     """
+    force = nodes.force.reshape(len(nodes), -1)
+    estimates = np.zeros((len(states), len(targets.orders), force.shape[1]))
+    if isinstance(force, Tracer):
+        estimates = jnp.asarray(estimates)
+    for inside, where in apart(nodes, rule, states):
+        part = _evaluate_region(inside, rule, states[where], targets)
+        estimates = _placed(estimates, where, part)
+    return jnp.asarray(estimates).reshape(len(states), len(targets.orders), *nodes.force.shape[1:])
+
+
+def apart(nodes: Nodes, rule: Rule, states: NDArray[np.float64]) -> Iterator[tuple[Nodes, NDArray[np.intp]]]:
+    """The nodes of each region, and the indices of the states that lie there: the sum of eq. 50, term by term."""
+    if not rule.across:
+        yield nodes, np.arange(len(states))
+        return
+    of_nodes, of_states = regions(nodes.states, rule.across), regions(states, rule.across)
+    for number in np.unique(of_states):
+        own = np.flatnonzero(of_nodes == number)
+        where = np.flatnonzero(of_states == number)
+        if own.size <= 1:
+            raise RuntimeError(
+                f"{where.size} of {len(states)} states lie in a region between the interfaces `across` where no "
+                f"readings were taken, the first {np.array2string(states[where[0]], precision=4)}."
+            )
+        taken = Nodes(nodes.states[own], _take(nodes.force, own), nodes.multiplicity[own], nodes.scale, nodes.reach)
+        yield taken, where
+
+
+def _evaluate_region(
+    nodes: Nodes, rule: Rule, states: NDArray[np.float64], targets: DerivativeTargets
+) -> Float[Array, "q derivatives outputs"]:
     tree = KDTree(np.asarray(nodes.states) / np.asarray(nodes.scale))
     estimates, ratio = _by_moments(tree, nodes, rule, states, targets)
     doubtful = np.flatnonzero(ratio < TRUSTED_PIVOT_RATIO)
     if doubtful.size:
         exact, conditioning = _by_factorisation(tree, nodes, rule, states[doubtful], targets)
-        failed = doubtful[conditioning < SINGULAR]
+        failed = doubtful[~(conditioning >= SINGULAR)]
         if failed.size:
             first = np.array2string(states[failed[0]], precision=4)
             raise RuntimeError(
                 f"{degenerate_message(nodes, rule)} So at {failed.size} of {len(states)} states, the first {first}."
             )
-        estimates = estimates.at[doubtful].set(exact)
-    return estimates.reshape(len(states), len(targets.orders), *nodes.force.shape[1:])
+        estimates = _placed(estimates, doubtful, exact)
+    return estimates
 
 
 def _by_moments(
@@ -79,17 +112,29 @@ def _by_factorisation(
     tree: KDTree, nodes: Nodes, rule: Rule, states: NDArray[np.float64], targets: DerivativeTargets
 ) -> tuple[Float[Array, "q derivatives outputs"], NDArray[np.float64]]:
     """Exact estimates with supports that grow, each with the conditioning of its basis."""
+    near = gathered_nodes(rule.neighbours, len(nodes))
+    parts = [
+        (_first(estimates, length), np.asarray(conditioning)[:length])
+        for around, block, length in neighbourhoods(tree, nodes, near, states, _block_length(nodes, rule, near))
+        for estimates, conditioning in [_exact_estimates(around, nodes.scale, rule, block, targets)]
+    ]
+    estimates, conditionings = zip(*parts, strict=True)
+    return _joined(list(estimates)), np.concatenate(conditionings)
+
+
+def neighbourhoods(
+    tree: KDTree, nodes: Nodes, count: int, states: NDArray[np.float64], largest: int
+) -> Iterator[tuple[Neighbourhood, Float[Array, "block dim"], int]]:
+    """Blocks of at most `largest` states with their `count` nearest nodes; the last number counts the true states.
+
+    The force of each neighbourhood is (block, count, outputs).
+    """
     node_states, multiplicity = np.asarray(nodes.states), np.asarray(nodes.multiplicity)
-    scale, near = np.asarray(nodes.scale), gathered_nodes(rule.neighbours, len(nodes))
     force = nodes.force.reshape(len(nodes), -1)
-    estimates, conditionings = [], []
-    for block, length in padded_blocks(states, _block_length(nodes, rule, near)):
-        _, index = _nearest(tree, block / scale, near)
+    for block, length in padded_blocks(states, largest):
+        _, index = _nearest(tree, block / np.asarray(nodes.scale), count)
         around = Neighbourhood(jnp.asarray(node_states[index]), _take(force, index), jnp.asarray(multiplicity[index]))
-        block_estimates, conditioning = _exact_estimates(around, nodes.scale, rule, jnp.asarray(block), targets)
-        estimates.append(_first(block_estimates, length))
-        conditionings.append(np.asarray(conditioning)[:length])
-    return _joined(estimates), np.concatenate(conditionings)
+        yield around, jnp.asarray(block), length
 
 
 @eqx.filter_jit
@@ -118,9 +163,18 @@ def _nearest(tree: KDTree, points: NDArray[np.float64], count: int) -> tuple[NDA
     return np.asarray(distance), np.asarray(index)
 
 
-def _take(force: Float[Array, "nodes outputs"], index: NDArray[np.intp]) -> Float[Array, "q near outputs"]:
+def _take(force: Float[Array, "nodes *outputs"], index: NDArray[np.intp]) -> Array:
     """Rows of the force; on the host unless it is traced, so that no program depends on the number of nodes."""
     return force[index] if isinstance(force, Tracer) else jnp.asarray(np.asarray(force)[index])
+
+
+def _placed(values: Any, where: NDArray[np.intp], part: Any) -> Any:
+    """Rows `where` replaced by `part`; on the host unless one is traced."""
+    if isinstance(values, Tracer) or isinstance(part, Tracer):
+        return jnp.asarray(values).at[where].set(part)
+    values = np.array(values)
+    values[where] = np.asarray(part)
+    return values
 
 
 def _first(block: Array, length: int) -> Any:

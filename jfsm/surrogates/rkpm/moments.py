@@ -56,7 +56,7 @@ def moment_estimates(
     M holds far fewer distinct moments Σ w z^(α+β) than entries: 28 for the 10 × 10 of a cubic basis in two dimensions.
     """
     dim, order = offsets.shape[-1], rule.order
-    dilation = support_radius(distance, rule.neighbours) / rule.window.radius
+    dilation = rule.dilation * support_radius(distance, rule.neighbours) / rule.window.radius
     z = offsets / dilation[:, None, None]
     weight = window_weights(z, rule.window) * multiplicity
     powers = multi_indices(dim, 2 * order)

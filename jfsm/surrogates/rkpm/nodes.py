@@ -7,15 +7,19 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
+from scipy.spatial import KDTree
 
 from ..._types import as_array
-from .basis import basis_size, monomials
+from .basis import basis_size, chebyshev_polynomials
 
 RANK_TOLERANCE = 1e-11
-"""Singular values below this share of the largest count as zero; the monomials are in scaled coordinates."""
+"""Singular values below this share of the largest count as zero; the polynomials are Chebyshev's over the box."""
 
 CONSTANT_TOLERANCE = 1e-12
 """A column that varies by less than this share of its size is constant to rounding."""
+
+REACH_ORDER = 3
+"""Order whose n* measures the visited region of maps of higher order too."""
 
 
 class Nodes(eqx.Module):
@@ -24,7 +28,12 @@ class Nodes(eqx.Module):
     states: Float[Array, "nodes dim"]
     force: Float[Array, "nodes *outputs"]
     multiplicity: Float[Array, " nodes"]
+    """How many readings each node stands for; less where they are doubted."""
     scale: Float[Array, " dim"]
+    """Standard deviation of each column."""
+    reach: Float[Array, ""]
+    """Distance to the nearest node, in standard deviations, within which a state counts as visited: that of 95 in 100
+    nodes to their n*-th neighbour."""
 
     def __len__(self) -> int:
         return self.states.shape[0]
@@ -61,21 +70,24 @@ def prepare_nodes(states: Any, force: Any, order: int) -> Nodes:
             f"got shape {force.shape}."
         )
     distinct, inverse, counts = np.unique(states, axis=0, return_inverse=True, return_counts=True)
-    _check_enough(distinct, order)
+    check_enough(distinct, order)
     scale = states.std(axis=0)
     for column in np.flatnonzero(scale <= CONSTANT_TOLERANCE * np.abs(states).max(axis=0)):
         raise ValueError(
             f"Column {column} of `states` is constant ({states[0, column]:g}): the force cannot depend on it. "
             "Leave it out."
         )
-    _check_rank(distinct, scale, order)
+    check_rank(distinct, order)
     total = jnp.zeros((len(counts), *force.shape[1:])).at[inverse.reshape(-1)].add(force)
     multiplicity = jnp.asarray(counts, dtype=float)
     mean = total / multiplicity.reshape(-1, *[1] * (force.ndim - 1))
-    return Nodes(jnp.asarray(distinct), mean, multiplicity, jnp.asarray(scale))
+    neighbours = min(basis_size(states.shape[1], min(order, REACH_ORDER)), len(counts) - 1)
+    distance = np.asarray(KDTree(distinct / scale).query(distinct / scale, k=neighbours + 1)[0])
+    reach = np.quantile(distance[:, -1], 0.95)
+    return Nodes(jnp.asarray(distinct), mean, multiplicity, jnp.asarray(scale), jnp.asarray(reach))
 
 
-def _check_enough(distinct: np.ndarray, order: int) -> None:
+def check_enough(distinct: np.ndarray, order: int) -> None:
     count, dim = distinct.shape
     least = basis_size(dim, order)
     if count < least:
@@ -85,10 +97,10 @@ def _check_enough(distinct: np.ndarray, order: int) -> None:
         )
 
 
-def _check_rank(distinct: np.ndarray, scale: np.ndarray, order: int) -> None:
-    """Singular monomials over all nodes are singular in every neighbourhood."""
-    z = (distinct - distinct.mean(axis=0)) / scale
-    basis = np.asarray(monomials(jnp.asarray(z), order))
+def check_rank(distinct: np.ndarray, order: int) -> None:
+    """Polynomials that are dependent over all nodes are so in every neighbourhood."""
+    low, high = distinct.min(axis=0), distinct.max(axis=0)
+    basis = chebyshev_polynomials((2.0 * distinct - high - low) / (high - low), order)
     singular_values = np.linalg.svd(np.linalg.qr(basis, mode="r"), compute_uv=False)
     rank = int(np.sum(singular_values > RANK_TOLERANCE * singular_values[0]))
     if rank < basis.shape[1]:

@@ -46,6 +46,7 @@ def choose_dilation(
     neighbours: int,
     order: int,
     window: AbstractWindow,
+    factor: Float[Array, ""] | float = 1.0,
 ) -> Float[Array, ""]:
     """Dilation a at one point, in the coordinates of `offsets`.
 
@@ -57,6 +58,8 @@ def choose_dilation(
         How many readings each node stands for.
     neighbours : int
         Number of nodes wanted inside the support.
+    factor : float
+        Share of that support which is used.
 
     Notes
     -----
@@ -66,7 +69,8 @@ def choose_dilation(
     squared = jnp.sum(offsets**2, axis=-1)
     apart = squared > 0.0
     distance = jnp.where(apart, jnp.sqrt(jnp.where(apart, squared, 1.0)), 0.0)
-    dilations = jnp.stack([support_radius(distance, factor * neighbours) for factor in GROWTH]) / window.radius
+    radii = jnp.stack([support_radius(distance, growth * neighbours) for growth in GROWTH])
+    dilations = factor * radii / window.radius
 
     def sound(dilation: Float[Array, ""]) -> Bool[Array, ""]:
         z = offsets / dilation

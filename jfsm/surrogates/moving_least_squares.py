@@ -1,0 +1,115 @@
+"""Force state map by moving least squares."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax.core import Tracer
+from jaxtyping import Array, ArrayLike, Float
+
+from ._differentiate import mixed_derivative
+from ._scattered import AbstractScatteredMap, whole_number
+from .rkpm.basis import MultiIndex
+from .rkpm.estimates import Rule
+from .rkpm.interfaces import Interface
+from .rkpm.nodes import Nodes, prepare_nodes
+from .rkpm.rkpm import RKPM
+from .rkpm.rule import weighing_rule
+from .rkpm.windows import AbstractWindow, QuarticSplineWindow
+
+
+class MovingLeastSquares(AbstractScatteredMap):
+    """Moving least squares map; build it with `MovingLeastSquares.fit`.
+
+    Notes
+    -----
+    With the same window its values are those of `RKPM`: the correction function of the kernel and the normal equations
+    of the local fit are the same [1]_. Derivatives are those of the map itself: they belong to its value everywhere,
+    while those of `RKPM` are read off the local polynomial, nearer to a smooth truth and much cheaper.
+
+    References
+    ----------
+    .. [1] T. Belytschko et al., Comput. Methods Appl. Mech. Engrg. 139 (1996) 3-47.
+    """
+
+    nodes: Nodes
+    rule: Rule
+
+    @classmethod
+    def fit(
+        cls,
+        states: Any,
+        force: Any,
+        order: int = 3,
+        neighbours: int | None = None,
+        window: AbstractWindow | None = None,
+        dilation: Any = 1.0,
+        across: Sequence[Interface] = (),
+    ) -> "MovingLeastSquares":
+        """Map through readings of the restoring force; the arguments and errors are those of `RKPM.fit`.
+
+        The window is `QuarticSplineWindow` when None.
+        """
+        order = whole_number(order, "order", 1)
+        nodes = prepare_nodes(states, force, order)
+        window = QuarticSplineWindow() if window is None else window
+        return cls(nodes, weighing_rule(nodes, order, neighbours, window, dilation, across))
+
+    @property
+    def _values(self) -> RKPM:
+        return RKPM(self.nodes, self.rule)
+
+    def __call__(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
+        """Restoring force at one state; a RuntimeError where the nodes around it are in degenerate position."""
+        return self._values(state)
+
+    def gradient(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs dim"]:
+        """First derivatives of the map at one state."""
+        return _gradient(self._values, self._state(state))
+
+    def derivative(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
+        """Derivative of the map at one state; ``orders=(2, 0)`` is the second one in the first column.
+
+        The window has two continuous derivatives: from the third on they jump at the edge of every node's support.
+        """
+        return _derivative(self._values, self._state(state), self._orders(orders, self.rule.order))
+
+    def std(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
+        """Standard error of the force at one state, as `RKPM.std`."""
+        return self._values.std(state)
+
+    def evaluate_derivatives(
+        self, states: Float[ArrayLike, "q dim"], orders: Sequence[MultiIndex]
+    ) -> Float[Array, "q derivatives *outputs"]:
+        """Several derivatives at many states; the force itself is evaluated as fast as that of `RKPM`."""
+        traced = any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves((states, self)))
+        checked = [self._orders(one, self.rule.order) for one in orders]
+        states = states if traced else self._states(states)
+        columns = []
+        for one in checked:
+            if any(one):
+                columns.append(_many_derivatives(self._values, jnp.asarray(states), one))
+            else:
+                columns.append(self._values.evaluate(states))
+        return jnp.stack(columns, axis=1)
+
+
+@eqx.filter_jit
+def _gradient(values: RKPM, state: Float[Array, " dim"]) -> Float[Array, "*outputs dim"]:
+    return jax.jacfwd(values)(state)
+
+
+@eqx.filter_jit
+def _derivative(values: RKPM, state: Float[Array, " dim"], orders: MultiIndex) -> Float[Array, "*outputs"]:
+    return mixed_derivative(values, orders)(state)
+
+
+@eqx.filter_jit
+def _many_derivatives(values: RKPM, states: Float[Array, "q dim"], orders: MultiIndex) -> Float[Array, "q *outputs"]:
+    return jax.lax.map(mixed_derivative(values, orders), states, batch_size=min(BATCH, max(len(states), 1)))
+
+
+BATCH = 64
+"""States whose neighbourhoods are held at once."""
