@@ -1,0 +1,390 @@
+"""Force state map by universal kriging."""
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Array, ArrayLike, Bool, Float
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from ..._types import as_array, require_x64
+from .._blocks import padded_blocks
+from .._map import AbstractForceStateMap
+from .correlations import AbstractCorrelation, Gaussian
+from .fitting import Options, Part, fit_part
+from .leave_one_out import LeaveOneOut
+from .likelihood import Readings
+from .likelihood import negative_log_likelihood as _negative_log_likelihood
+from .posterior import Orders, Posterior, derivatives_at, draw, left_out, standard_errors_at
+from .readings import check_readings
+from .trend import PolynomialTrend, as_trend, trend_basis
+
+POINTS = 2000
+"""Readings of an exact fit unless asked otherwise; one evaluation of likelihood and gradient takes half a second."""
+
+LARGEST_WORK = 2**22
+"""States × points in flight at once: 32 MiB a matrix."""
+
+
+class Kriging(AbstractForceStateMap):
+    r"""Universal kriging map, the paper's eqs. 52 to 69; build it with `Kriging.fit`.
+
+    The force is a trend plus a Gaussian random field Z plus noise,
+
+    .. math:: g(x_i) = f(x_i)^T \beta + Z(x_i) + e_i, \quad
+        \mathrm{Cov}[Z(x), Z(x')] = \sigma^2 R(x - x'), \quad \mathrm{Var}[e_i] = \sigma^2 \nu r_i
+
+    with process variance σ², nugget ν, and r_i = 1 unless the noise of the readings differs.
+    """
+
+    parts: tuple[Posterior, ...]
+    """One for all outputs where they share their hyper-parameters, else one per output."""
+    optima: Float[Array, " parts"]
+    reach: Float[Array, ""]
+    """Distance to the nearest point, in standard deviations of the states, within which a state counts as visited."""
+    vector: bool = eqx.field(static=True)
+    remarks: tuple[str, ...] = eqx.field(static=True)
+    """What the fit ran into, in words: bounds, jitter, readings merged."""
+
+    @classmethod
+    def fit(
+        cls,
+        states: Any,
+        force: Any,
+        correlation: AbstractCorrelation | None = None,
+        trend: str | PolynomialTrend = "quadratic",
+        nugget: Literal["estimate"] | Any = "estimate",
+        *,
+        length_scale: Any = None,
+        noise_variance: Any = None,
+        state_std: Any = None,
+        restricted: bool = False,
+        shared: bool = False,
+        points: int = POINTS,
+    ) -> "Kriging":
+        """Map of largest likelihood through readings of the restoring force.
+
+        Parameters
+        ----------
+        states : (n, dim) array
+            Columns x1…xd, v1…vd, or any coordinates in any unit.
+        force : (n,) or (n, outputs) array
+            Restoring force at the states.
+        correlation : AbstractCorrelation, optional
+            `Gaussian()`, eq. 57, when None.
+        trend : str or PolynomialTrend
+            "constant", "linear", "quadratic", "pure quadratic" (no cross terms), "cubic", or any polynomial.
+        nugget : "estimate", float or (n,) array
+            Noise variance over the process variance, dimensionless. Zero interpolates; an array is kept per reading.
+        length_scale : (dim,) array, optional
+            Kept instead of estimated, in the units of the columns.
+        noise_variance : float, (n,) or (n, outputs) array, optional
+            Noise variance of the readings [N²] where it is known; in place of `nugget`.
+        state_std : (dim,) or (n, dim) array, optional
+            Standard deviation of noise in the states themselves, in the units of the columns. Each reading then gets
+            the noise that it makes through the slope of the map, in three passes. It mends weights and error bars, not
+            the flattening that noisy inputs cause: smooth the motion first (`jfsm.estimate_motion`).
+        restricted : bool
+            Restricted likelihood, which allows for the trend coefficients having been estimated.
+        shared : bool
+            Whether all outputs have the same length scales and nugget; process variances are always their own.
+        points : int
+            Largest number of points of an exact fit, whose time grows like its cube and memory like its square. More
+            readings are first merged to means over the cells of a grid, 1000 at most, which count by the number of
+            their readings.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If the arguments do not fit together, values are not finite, or the states cannot determine the trend.
+        MemoryError
+            If the likelihood of so many points would not fit into memory.
+        RuntimeError
+            If the correlation matrix is not positive definite wherever it was tried.
+        """
+        require_x64()
+        trend = as_trend(trend)
+        dim = np.shape(states)[1] if np.ndim(states) == 2 else 1
+        states, columns = check_readings(states, force, len(trend.exponents(dim)))
+        vector = columns.ndim == 2
+        columns = columns.reshape(len(states), -1)
+        options = Options.checked(
+            _correlation(correlation), trend, nugget, length_scale, restricted, points, columns=states.shape[1]
+        )
+        parts = Part.of(states, columns, nugget, noise_variance, state_std, shared)
+        fitted = [fit_part(part, options) for part in parts]
+        remarks = tuple(
+            f"Output {k}: {remark}" if len(fitted) > 1 else remark
+            for k, one in enumerate(fitted)
+            for remark in one.remarks
+        )
+        optima = jnp.asarray([one.negative_log_likelihood for one in fitted])
+        return cls(tuple(one.posterior for one in fitted), optima, _reach(fitted[0].posterior), vector, remarks)
+
+    @staticmethod
+    def negative_log_likelihood(
+        log_parameters: Float[ArrayLike, " parameters"],
+        states: Float[ArrayLike, "n dim"],
+        force: Float[ArrayLike, "n *outputs"],
+        correlation: AbstractCorrelation | None = None,
+        trend: str | PolynomialTrend = "quadratic",
+        restricted: bool = False,
+    ) -> Float[Array, ""]:
+        """Eq. 64 at its minimum over trend coefficients and process variance, eqs. 65 to 67, constants kept.
+
+        Parameters
+        ----------
+        log_parameters : (dim + 1,) array
+            Natural logarithms of the length scales, in the units of the columns, and of the nugget; shared by outputs.
+        states, force, correlation, trend, restricted
+            As for `fit`. All may be traced; readings are never merged.
+
+        Returns
+        -------
+        value : () array
+            In nats. Not finite where the matrix of correlations is not positive definite. Eq. 67 of the paper drops
+            the n/2 that eq. 66 leaves in eq. 64; it is kept here.
+        """
+        require_x64()
+        trend = as_trend(trend)
+        log_parameters = _numbers(log_parameters, "log_parameters", 1)
+        states, force = _numbers(states, "states", 2), _numbers(force, "force", (1, 2))
+        if log_parameters.shape != (states.shape[1] + 1,):
+            raise ValueError(
+                f"`log_parameters` must hold the logarithms of {states.shape[1]} length scales and of the nugget, "
+                f"shape ({states.shape[1] + 1},); got shape {log_parameters.shape}."
+            )
+        if not isinstance(states, Tracer) and not isinstance(force, Tracer):
+            check_readings(states, force, len(trend.exponents(states.shape[1])))
+        return _likelihood(log_parameters, states, force, _correlation(correlation), trend, restricted)
+
+    @property
+    def dim(self) -> int:
+        return self.parts[0].states.shape[1]
+
+    @property
+    def box(self) -> Float[Array, "2 dim"]:
+        states = self.parts[0].states
+        return jnp.stack([jnp.min(states, axis=0), jnp.max(states, axis=0)])
+
+    @property
+    def length_scale(self) -> Float[Array, "*parts dim"]:
+        """Length scales in the units of the columns; one row per output unless they are shared."""
+        return self._per_part("length_scale")
+
+    @property
+    def nugget(self) -> Float[Array, "*parts"]:
+        """Noise variance of a reading over the process variance; one per output unless they are shared."""
+        return self._per_part("nugget")
+
+    @property
+    def jitter(self) -> Float[Array, "*parts"]:
+        """What had to be added to the diagonal of R for numerical reasons alone."""
+        return self._per_part("jitter")
+
+    @property
+    def process_variance(self) -> Float[Array, "*outputs"]:
+        """σ² of eq. 66 [N²]; over n - p where the likelihood is restricted."""
+        return self._joined([part.process_variance for part in self.parts])
+
+    @property
+    def noise_variance(self) -> Float[Array, "*outputs"]:
+        """Noise variance of a reading [N²]: nugget times process variance."""
+        return self._joined([part.nugget * part.process_variance for part in self.parts])
+
+    @property
+    def log_likelihood(self) -> Float[Array, ""]:
+        """Largest log-likelihood, of all outputs together, in nats; of the means if readings were merged.
+
+        Infinite where the trend explains an output to rounding.
+        """
+        return -jnp.sum(self.optima)
+
+    @property
+    def trend_coefficients(self) -> Float[Array, "p *outputs"]:
+        """β of eq. 65, of the monomials 1, x, v, x², xv, v², … of the columns, in the order of `trend.exponents`."""
+        origin = jnp.zeros((1, self.dim))
+        found = []
+        for exponents in self.parts[0].trend.trend.exponents(self.dim):
+            factorial = float(np.prod([np.prod(np.arange(1, e + 1)) for e in exponents]))
+            rows = [part.trend(origin, exponents)[0] @ part.trend_coefficients / factorial for part in self.parts]
+            found.append(self._joined(rows))
+        return jnp.stack(found)
+
+    def __call__(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
+        """Restoring force at one state, eq. 69."""
+        return self._derivatives(self._state(state), (self._value,))[0, 0]
+
+    def gradient(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs dim"]:
+        """First derivatives of the map at one state."""
+        axes = tuple(self._orders(row) for row in np.eye(self.dim, dtype=int))
+        return jnp.moveaxis(self._derivatives(self._state(state), axes)[0], 0, -1)
+
+    def derivative(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
+        """Derivative of the map at one state, from the derivative of the correlation; ``orders=(1, 1)`` is ∂²f/∂x∂v.
+
+        Raises
+        ------
+        ValueError
+            If the map has no such derivative: along one column it has twice as many as the random field, and one at
+            least. Rough correlations have kinks at the readings, where the slope is the mean of both sides.
+        """
+        return self._derivatives(self._state(state), (self._orders(orders),))[0, 0]
+
+    def std(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...] | None = None) -> Float[Array, "*outputs"]:
+        """Standard error of the force at one state, or of its derivative; without the noise of a new reading.
+
+        The uncertainty of the trend coefficients is in it, that of the hyper-parameters is not.
+
+        Raises
+        ------
+        ValueError
+            If the random field has no such derivative: its slope is then infinitely uncertain.
+        """
+        return self._standard_errors(self._state(state), self._field_orders(orders))[0]
+
+    def evaluate_derivatives(
+        self, states: Float[ArrayLike, "q dim"], orders: Sequence[tuple[int, ...]]
+    ) -> Float[Array, "q derivatives *outputs"]:
+        """Several derivatives at many states; ``(0, 0)`` among `orders` is the force itself."""
+        wanted = tuple(self._orders(one) for one in orders)
+        if self._traced(states):
+            return self._derivatives(jnp.asarray(states), wanted)
+        return self._in_blocks(states, lambda block: self._derivatives(block, wanted), (len(wanted),))
+
+    def evaluate_std(
+        self, states: Float[ArrayLike, "q dim"], orders: tuple[int, ...] | None = None
+    ) -> Float[Array, "q *outputs"]:
+        """`std` at many states."""
+        wanted = self._field_orders(orders)
+        if self._traced(states):
+            return self._standard_errors(jnp.asarray(states), wanted)
+        return self._in_blocks(states, lambda block: self._standard_errors(block, wanted), ())
+
+    def visited(self, states: Float[ArrayLike, "q dim"]) -> Bool[NDArray[np.bool_], " q"]:
+        """Whether each state has a point within `reach`: the distance of 95 in 100 points to a near neighbour."""
+        points, scale = _scaled(self.parts[0])
+        distance, _ = KDTree(points).query(self._states(states) / scale)
+        return distance <= float(self.reach)
+
+    def leave_one_out(self) -> LeaveOneOut:
+        """Every reading (or mean of merged readings) predicted from all others, in closed form."""
+        found = [left_out(part) for part in self.parts]
+        residual, std = (self._joined([one[i] for one in found]) for i in (0, 1))
+        return LeaveOneOut(np.asarray(residual), np.asarray(std))
+
+    def sample(self, states: Float[ArrayLike, "q dim"], count: int, key: Array) -> Float[Array, "count q *outputs"]:
+        """Force at the states in `count` maps that are as plausible as this one."""
+        where = jnp.asarray(self._states(states))
+        keys = jax.random.split(key, len(self.parts))
+        drawn = [_draw(part, where, count, one) for part, one in zip(self.parts, keys, strict=True)]
+        return self._joined(drawn)
+
+    def _derivatives(self, states: Float[Array, "q dim"], orders: tuple[Orders, ...]) -> Array:
+        return self._joined([derivatives_at(part, states, orders) for part in self.parts])
+
+    def _standard_errors(self, states: Float[Array, "q dim"], orders: Orders) -> Array:
+        return self._joined([standard_errors_at(part, states, orders) for part in self.parts])
+
+    def _joined(self, parts: list[Array]) -> Array:
+        """All outputs in the last axis, or none where the force was one column."""
+        joined = parts[0] if len(parts) == 1 else jnp.concatenate(parts, axis=-1)
+        return joined if self.vector else joined[..., 0]
+
+    def _per_part(self, name: str) -> Array:
+        values = [getattr(part, name) for part in self.parts]
+        return values[0] if len(values) == 1 else jnp.stack(values)
+
+    def _in_blocks(self, states: Any, evaluate, axes: tuple[int, ...]) -> Array:
+        """Blocks of few sizes, so that memory is bounded and few programs are compiled."""
+        blocks = padded_blocks(self._states(states), LARGEST_WORK // len(self.parts[0].states))
+        found = [np.asarray(evaluate(jnp.asarray(block)))[:length] for block, length in blocks]
+        outputs = sum(len(part.process_variance) for part in self.parts)
+        shape = (0, *axes, *([outputs] if self.vector else []))
+        return jnp.asarray(np.concatenate(found) if found else np.zeros(shape))
+
+    def _traced(self, states: Any) -> bool:
+        return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves((states, self.parts)))
+
+    def _states(self, states: Any) -> NDArray[np.float64]:
+        states = as_array(states, "states", 2)
+        if states.shape[1] != self.dim:
+            raise ValueError(f"`states` must have {self.dim} columns, as in `fit`; got shape {states.shape}.")
+        return states
+
+    def _state(self, state: Any) -> Float[Array, "1 dim"]:
+        state = state if isinstance(state, Tracer) else jnp.asarray(as_array(state, "state", 1))
+        if state.shape != (self.dim,):
+            raise ValueError(
+                f"`state` must be one state of shape ({self.dim},); got shape {state.shape}. "
+                "Use `evaluate` or `jax.vmap` for many."
+            )
+        return state[None]
+
+    @property
+    def _value(self) -> Orders:
+        return (0,) * self.dim
+
+    def _orders(self, orders: Any) -> Orders:
+        return self._checked_orders(orders, max(1.0, 2.0 * self.parts[0].correlation.smoothness), "map")
+
+    def _field_orders(self, orders: Any) -> Orders:
+        smoothness = self.parts[0].correlation.smoothness
+        return self._value if orders is None else self._checked_orders(orders, smoothness, "random field")
+
+    def _checked_orders(self, orders: Any, most: float, what: str) -> Orders:
+        orders = tuple(orders)
+        whole = all(isinstance(o, int | np.integer) and o >= 0 for o in orders)
+        if len(orders) != self.dim or not whole or max(orders) > most:
+            name = type(self.parts[0].correlation).__name__
+            raise ValueError(
+                f"`orders` must be {self.dim} integers from 0, one per column, at most {most:g} each: more derivatives "
+                f"the {what} with {name} correlation does not have; got {orders!r}. Matern52 and Gaussian have more."
+            )
+        return tuple(int(o) for o in orders)
+
+
+def _correlation(correlation: Any) -> AbstractCorrelation:
+    correlation = Gaussian() if correlation is None else correlation
+    if not isinstance(correlation, AbstractCorrelation):
+        raise TypeError(f"`correlation` must be a correlation such as jfsm.Gaussian(); got {correlation!r}.")
+    return correlation
+
+
+def _numbers(value: Any, name: str, ndim: int | tuple[int, ...]) -> Array:
+    if isinstance(value, Tracer):
+        return value
+    array = np.asarray(value)
+    if name == "log_parameters" and np.any(np.isneginf(array)):  # a nugget of zero
+        return jnp.asarray(array)
+    return jnp.asarray(as_array(array, name, ndim))
+
+
+@eqx.filter_jit
+def _likelihood(log_parameters, states, force, correlation, trend, restricted):
+    _, basis = trend_basis(trend, states)
+    columns = force.reshape(len(states), -1)
+    readings = Readings(states, basis, columns, jnp.ones(len(states)), correlation, None, restricted)
+    return _negative_log_likelihood(log_parameters, readings, jnp.zeros(()))
+
+
+_draw = eqx.filter_jit(draw)
+
+
+def _scaled(part: Posterior) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points in standard deviations of their columns, and these."""
+    states = np.asarray(part.states)
+    scale = states.std(axis=0)
+    return states / scale, scale
+
+
+def _reach(part: Posterior) -> Float[Array, ""]:
+    points, _ = _scaled(part)
+    neighbours = min(part.trend.triangle.shape[0] + 1, len(points))
+    distance, _ = KDTree(points).query(points, k=neighbours)
+    return jnp.asarray(np.quantile(np.asarray(distance)[:, -1], 0.95))
