@@ -13,7 +13,8 @@ jax.config.update("jax_numpy_rank_promotion", "raise")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """One store of compiled programs for all processes of a run: what one has compiled, the others load."""
+    """One store of compiled programs for all processes of a run, and one thread of linear algebra for each."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if "JAX_COMPILATION_CACHE_DIR" not in os.environ and not hasattr(config, "workerinput"):
         store = tempfile.TemporaryDirectory(prefix="jfsm-programs-")
         os.environ["JAX_COMPILATION_CACHE_DIR"] = store.name
