@@ -23,13 +23,12 @@ _GRID = 41
 
 @dataclass(frozen=True)
 class Residual:
-    """Missing force (n,) of one link against its motion, with its standard error."""
+    """Missing force of one link against its motion."""
 
     at: tuple[int, int]
     displacement: np.ndarray
     velocity: np.ndarray
     force: np.ndarray
-    std: np.ndarray
     force_map: RKPM | None
 
 
@@ -48,11 +47,9 @@ def residual(structure: Structure, nuisances: Nuisances, until: int, at: tuple[i
     links = list(structure.links)
     rows = np.array([direction(link, structure.dof) for link in links])
     # Forces on degrees of freedom as forces on links: exact for a chain, least squares otherwise.
-    to_links = np.linalg.pinv(rows.T)
-    forces = to_links @ found.force.T
+    forces = np.linalg.lstsq(rows.T, found.force.T, rcond=None)[0]
     link = int(np.argmax(np.std(forces, axis=1))) if at is None else links.index(at)
     d, w, f = found.displacement @ rows[link], found.velocity @ rows[link], forces[link]
-    std = np.sqrt(np.maximum(np.einsum("i,nij,j->n", to_links[link], found.covariance, to_links[link]), 0.0))
     count = min(until, n)
     take = np.unique(np.linspace(0, count - 1, min(count, _NODES)).astype(int))
     try:
@@ -61,7 +58,7 @@ def residual(structure: Structure, nuisances: Nuisances, until: int, at: tuple[i
         )
     except (ValueError, RuntimeError):  # one orbit only, or too few points: there is no surface to draw
         force_map = None
-    return Residual(links[link], d, w, f, std, force_map)
+    return Residual(links[link], d, w, f, force_map)
 
 
 def stand_in(trial: Trial, records: list[Nuisances], until: list[int]) -> Trial | None:
@@ -100,7 +97,6 @@ def curves(found: Residual, units, term: AbstractTerm | None) -> dict[str, Any]:
     }
     points |= {
         "force": found.force[take].tolist(),
-        "std": found.std[take].tolist(),
         "unit": {k: units[k] for k in ("displacement", "velocity", "force")},
     }
     x = np.linspace(found.displacement.min(), found.displacement.max(), _GRID)

@@ -17,10 +17,10 @@ import numpy as np
 import scipy.linalg
 from jaxtyping import Array, Float
 
+from ..dynamics._along import force_along
 from ..dynamics._grid import Fine
 from ..dynamics._plant import Plant, Readout
 from ._kalman import LinearModel, log_likelihood, smoothed
-from ._missing import less_known
 
 _MEMORIES = (0.15, 1.0)
 """τ of the latent force, in radians of the motion."""
@@ -37,14 +37,14 @@ class Latent:
     ----------
     displacement, velocity, force : (n, dof) arrays
         `force` stands on the left-hand side, restoring side positive, beside everything the model has.
-    covariance : (n, dof, dof) array
-        Of the error of `force`: what the readings, the noise of the measured force and the error of the motion leave.
+    std : (n, dof) array
+        Standard error of `force`.
     """
 
     displacement: np.ndarray
     velocity: np.ndarray
     force: np.ndarray
-    covariance: np.ndarray
+    std: np.ndarray
 
 
 class _Model(NamedTuple):
@@ -98,10 +98,11 @@ def latent_force(
     data = (jnp.asarray(true), jnp.asarray(seen), jnp.asarray(use))
     likelihoods = np.asarray(_likelihoods(stacked, *data))
     best = models[int(np.nanargmax(likelihoods))]
-    mean, covariance = (np.asarray(out) for out in _smooth(best, *data))
+    mean, std = (np.asarray(out) for out in _smooth(best, *data))
     dof = plant.dof
     x, v, r = mean[:, :dof], mean[:, dof : 2 * dof], mean[:, 2 * dof :]
-    return Latent(x, v, *less_known(plant, np.asarray(fine.time)[:n], x, v, r, covariance))
+    known = np.asarray(force_along(plant, jnp.asarray(x), jnp.asarray(v), fine.time[:n]))
+    return Latent(x, v, r - known, std[:, 2 * dof :])
 
 
 def _model(
@@ -154,4 +155,5 @@ def _likelihoods(models: _Model, force, values, use):
 @jax.jit
 def _smooth(model: _Model, force, values, use):
     size = model.linear.step.shape[0]
-    return smoothed(model.linear, *_driven(model, force, values), use, jnp.eye(size))
+    mean, covariance = smoothed(model.linear, *_driven(model, force, values), use, jnp.eye(size))
+    return mean, jnp.sqrt(jnp.maximum(jnp.diagonal(covariance, axis1=1, axis2=2), 0.0))
