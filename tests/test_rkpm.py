@@ -318,6 +318,15 @@ def test_ill_conditioned_neighbourhoods_are_solved_again_exactly():
     np.testing.assert_allclose(force_map.evaluate(corners), all_monomials(corners, 3), rtol=0, atol=1e-8)
 
 
+def test_a_thousand_states_that_need_factorisation_are_no_more_than_a_hundred():
+    states = trajectory()
+    force_map = RKPM.fit(states, smooth_force(states), neighbours=80)
+    corner = np.linspace(0.9, 1.3, 1000)[:, None] * states.max(axis=0)  # far from all readings
+    orders = ((0, 0), (1, 0), (0, 1), (1, 1))
+    few, many_ = (force_map.evaluate_derivatives(part, orders) for part in (corner[:100], corner))
+    np.testing.assert_allclose(many_[:100], few, rtol=1e-9)
+
+
 def test_counts_within_one_power_of_two_share_one_program(monkeypatch):
     states = scattered(300, 2)
     force_map = RKPM.fit(states, smooth_force(states))

@@ -27,6 +27,9 @@ a two-tone motion with one neighbour to spare; at 1e-3 to 1e-7 only. QR keeps 1e
 LARGEST_WORK = 2**21
 """Numbers in flight at once, states × neighbours × monomials: 16 MiB, so that a block stays near the cache."""
 
+LARGEST_FACTORISED = 256
+"""States in one block of factorisations: from 512 on XLA's pool of two threads waits for itself and never ends."""
+
 
 def evaluate_many(
     nodes: Nodes, rule: Rule, states: NDArray[np.float64], targets: DerivativeTargets
@@ -127,11 +130,11 @@ def neighbourhoods(
 ) -> Iterator[tuple[Neighbourhood, Float[Array, "block dim"], int]]:
     """Blocks of at most `largest` states with their `count` nearest nodes; the last number counts the true states.
 
-    The force of each neighbourhood is (block, count, outputs).
+    Blocks are small enough to be factorised. The force of each neighbourhood is (block, count, outputs).
     """
     node_states, multiplicity = np.asarray(nodes.states), np.asarray(nodes.multiplicity)
     force = nodes.force.reshape(len(nodes), -1)
-    for block, length in padded_blocks(states, largest):
+    for block, length in padded_blocks(states, min(largest, LARGEST_FACTORISED)):
         _, index = _nearest(tree, block / np.asarray(nodes.scale), count)
         around = Neighbourhood(jnp.asarray(node_states[index]), _take(force, index), jnp.asarray(multiplicity[index]))
         yield around, jnp.asarray(block), length
