@@ -2,12 +2,16 @@
 
 import abc
 from collections.abc import Sequence
+from typing import Any
 
 import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Bool, Float
 from numpy.typing import NDArray
 
+from .._types import as_array
 from ..structures import MapTerm
 
 
@@ -73,3 +77,22 @@ class AbstractForceStateMap(eqx.Module):
                 "Fit a map of the link's own motion."
             )
         return MapTerm(self, at=at)
+
+    def _states(self, states: Any) -> NDArray[np.float64]:
+        states = as_array(states, "states", 2)
+        if states.shape[1] != self.dim:
+            raise ValueError(f"`states` must have {self.dim} columns, as in `fit`; got shape {states.shape}.")
+        return states
+
+    def _state(self, state: Any) -> Float[Array, " dim"]:
+        state = state if isinstance(state, Tracer) else jnp.asarray(as_array(state, "state", 1))
+        if state.shape != (self.dim,):
+            raise ValueError(
+                f"`state` must be one state of shape ({self.dim},); got shape {state.shape}. "
+                "Use `evaluate` or `jax.vmap` for many."
+            )
+        return state
+
+    def _axes(self) -> list[tuple[int, ...]]:
+        """The first derivatives, in the order of the columns."""
+        return [tuple(int(i == axis) for i in range(self.dim)) for axis in range(self.dim)]

@@ -5,13 +5,11 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Bool, Float
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
-from .._types import as_array
 from ._map import AbstractForceStateMap
+from ._readings import within
 from .rkpm.basis import MultiIndex
 from .rkpm.nodes import Nodes
 
@@ -35,23 +33,7 @@ class AbstractScatteredMap(AbstractForceStateMap):
         Elsewhere the map extrapolates, with errors 10 to 100 times larger.
         """
         scale = np.asarray(self.nodes.scale)
-        distance, _ = KDTree(np.asarray(self.nodes.states) / scale).query(self._states(states) / scale)
-        return distance <= float(self.nodes.reach)
-
-    def _states(self, states: Any) -> NDArray[np.float64]:
-        states = as_array(states, "states", 2)
-        if states.shape[1] != self.dim:
-            raise ValueError(f"`states` must have {self.dim} columns, as in `fit`; got shape {states.shape}.")
-        return states
-
-    def _state(self, state: Any) -> Float[Array, " dim"]:
-        state = state if isinstance(state, Tracer) else jnp.asarray(as_array(state, "state", 1))
-        if state.shape != (self.dim,):
-            raise ValueError(
-                f"`state` must be one state of shape ({self.dim},); got shape {state.shape}. "
-                "Use `evaluate` or `jax.vmap` for many."
-            )
-        return state
+        return within(np.asarray(self.nodes.states) / scale, float(self.nodes.reach), self._states(states) / scale)
 
     def _orders(self, orders: Any, highest: int) -> MultiIndex:
         """One derivative as a multi-index, of total order `highest` at most."""
@@ -63,10 +45,6 @@ class AbstractScatteredMap(AbstractForceStateMap):
                 f"{highest} at most; got {orders!r}."
             )
         return tuple(int(o) for o in orders)
-
-    def _axes(self) -> list[MultiIndex]:
-        """The first derivatives, in the order of the columns."""
-        return [tuple(int(i == axis) for i in range(self.dim)) for axis in range(self.dim)]
 
 
 def whole_number(value: Any, name: str, least: int) -> int:

@@ -10,11 +10,11 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Bool, Float
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from ..._types import as_array, require_x64
 from .._blocks import padded_blocks
 from .._map import AbstractForceStateMap
+from .._readings import reach_of, within
 from .correlations import AbstractCorrelation, Gaussian
 from .fitting import Options, Part, fit_part
 from .leave_one_out import LeaveOneOut
@@ -218,12 +218,11 @@ class Kriging(AbstractForceStateMap):
 
     def __call__(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
         """Restoring force at one state, eq. 69."""
-        return self._derivatives(self._state(state), (self._value,))[0, 0]
+        return self._derivatives(self._state(state)[None], (self._value,))[0, 0]
 
     def gradient(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs dim"]:
         """First derivatives of the map at one state."""
-        axes = tuple(self._orders(row) for row in np.eye(self.dim, dtype=int))
-        return jnp.moveaxis(self._derivatives(self._state(state), axes)[0], 0, -1)
+        return jnp.moveaxis(self._derivatives(self._state(state)[None], tuple(self._axes()))[0], 0, -1)
 
     def derivative(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
         """Derivative of the map at one state, from the derivative of the correlation; ``orders=(1, 1)`` is ∂²f/∂x∂v.
@@ -234,7 +233,7 @@ class Kriging(AbstractForceStateMap):
             If the map has no such derivative: along one column it has twice as many as the random field, and one at
             least. Rough correlations have kinks at the readings, where the slope is the mean of both sides.
         """
-        return self._derivatives(self._state(state), (self._orders(orders),))[0, 0]
+        return self._derivatives(self._state(state)[None], (self._orders(orders),))[0, 0]
 
     def std(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...] | None = None) -> Float[Array, "*outputs"]:
         """Standard error of the force at one state, or of its derivative; without the noise of a new reading.
@@ -246,7 +245,7 @@ class Kriging(AbstractForceStateMap):
         ValueError
             If the random field has no such derivative: its slope is then infinitely uncertain.
         """
-        return self._standard_errors(self._state(state), self._field_orders(orders))[0]
+        return self._standard_errors(self._state(state)[None], self._field_orders(orders))[0]
 
     def evaluate_derivatives(
         self, states: Float[ArrayLike, "q dim"], orders: Sequence[tuple[int, ...]]
@@ -269,8 +268,7 @@ class Kriging(AbstractForceStateMap):
     def visited(self, states: Float[ArrayLike, "q dim"]) -> Bool[NDArray[np.bool_], " q"]:
         """Whether each state has a point within `reach`: the distance of 95 in 100 points to a near neighbour."""
         points, scale = _scaled(self.parts[0])
-        distance, _ = KDTree(points).query(self._states(states) / scale)
-        return distance <= float(self.reach)
+        return within(points, float(self.reach), self._states(states) / scale)
 
     def leave_one_out(self) -> LeaveOneOut:
         """Every reading (or mean of merged readings) predicted from all others, in closed form."""
@@ -310,21 +308,6 @@ class Kriging(AbstractForceStateMap):
 
     def _traced(self, states: Any) -> bool:
         return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves((states, self.parts)))
-
-    def _states(self, states: Any) -> NDArray[np.float64]:
-        states = as_array(states, "states", 2)
-        if states.shape[1] != self.dim:
-            raise ValueError(f"`states` must have {self.dim} columns, as in `fit`; got shape {states.shape}.")
-        return states
-
-    def _state(self, state: Any) -> Float[Array, "1 dim"]:
-        state = state if isinstance(state, Tracer) else jnp.asarray(as_array(state, "state", 1))
-        if state.shape != (self.dim,):
-            raise ValueError(
-                f"`state` must be one state of shape ({self.dim},); got shape {state.shape}. "
-                "Use `evaluate` or `jax.vmap` for many."
-            )
-        return state[None]
 
     @property
     def _value(self) -> Orders:
@@ -384,7 +367,4 @@ def _scaled(part: Posterior) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def _reach(part: Posterior) -> Float[Array, ""]:
-    points, _ = _scaled(part)
-    neighbours = min(part.trend.triangle.shape[0] + 1, len(points))
-    distance, _ = KDTree(points).query(points, k=neighbours)
-    return jnp.asarray(np.quantile(np.asarray(distance)[:, -1], 0.95))
+    return jnp.asarray(reach_of(_scaled(part)[0], part.trend.triangle.shape[0]))

@@ -6,10 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._types import as_array
-
-CONSTANT_TOLERANCE = 1e-12
-"""A column that varies by less than this share of its size is constant to rounding."""
+from .._readings import check_shapes, check_varied
 
 MATRICES = 8
 """Matrices of the size of K that one evaluation of likelihood and gradient holds at once."""
@@ -33,25 +30,14 @@ def check_readings(states: Any, force: Any, size: int) -> tuple[NDArray[np.float
     TypeError, ValueError
         If shapes disagree, values are not finite, a column is constant, or there are too few.
     """
-    states, force = as_array(states, "states", 2), as_array(force, "force", (1, 2))
-    if states.shape[1] == 0:
-        raise ValueError(f"`states` must have at least one column; got shape {states.shape}.")
-    if len(force) != len(states) or force.ndim == 2 and force.shape[1] == 0:
-        raise ValueError(
-            f"`force` must have one row per state, shape ({len(states)},) or ({len(states)}, outputs); "
-            f"got shape {force.shape}."
-        )
+    states, force = check_shapes(states, force)
     if len(states) <= size:
         raise ValueError(
             f"`states` must hold more points than the trend has functions, {size} in {states.shape[1]} columns; "
             f"got {len(states)}. Add data or take a simpler trend, such as `trend='constant'`."
         )
-    for column in np.flatnonzero(states.std(axis=0) <= CONSTANT_TOLERANCE * np.abs(states).max(axis=0)):
-        raise ValueError(
-            f"Column {column} of `states` is constant ({states[0, column]:g}): the force cannot depend on it. "
-            "Leave it out."
-        )
-    return states, force
+    check_varied(states)
+    return states, np.asarray(force)
 
 
 def check_memory(points: int) -> None:

@@ -1,6 +1,5 @@
 """Trend of universal kriging: a polynomial, whose functions are made orthonormal over the readings."""
 
-import itertools
 import math
 from dataclasses import dataclass
 
@@ -11,8 +10,8 @@ from jax.core import Tracer
 from jax.scipy.linalg import solve_triangular
 from jaxtyping import Array, Float
 
-RANK_TOLERANCE = 1e-11
-"""Singular values below this share of the largest count as zero; the monomials are in scaled coordinates."""
+from .._readings import check_rank
+from ..rkpm.basis import multi_indices
 
 
 @dataclass(frozen=True)
@@ -32,9 +31,7 @@ class PolynomialTrend:
 
     def exponents(self, dim: int) -> tuple[tuple[int, ...], ...]:
         """Exponents of every monomial by rising total order: 1, x, v, x², xv, v², …"""
-        every = itertools.product(range(self.order + 1), repeat=dim)
-        kept = (e for e in every if sum(e) <= self.order and (self.cross_terms or sum(map(bool, e)) <= 1))
-        return tuple(sorted(kept, key=lambda e: (sum(e), *(-power for power in e))))
+        return tuple(e for e in multi_indices(dim, self.order) if self.cross_terms or sum(map(bool, e)) <= 1)
 
 
 TRENDS = {
@@ -111,7 +108,12 @@ def trend_basis(trend: PolynomialTrend, states: Float[Array, "n dim"]) -> tuple[
     """
     basis, f = _orthonormal(trend, states)
     if not isinstance(f, Tracer):
-        _check_rank(np.asarray(basis.triangle), trend, states.shape)
+        check_rank(
+            np.asarray(basis.triangle),
+            f"monomials of the trend of order {trend.order}",
+            f"{len(states)} points",
+            "Take a simpler trend or add data of another amplitude.",
+        )
     return basis, f
 
 
@@ -121,14 +123,3 @@ def _orthonormal(trend: PolynomialTrend, states: Float[Array, "n dim"]) -> tuple
     scale = jnp.where(spread > 0.0, spread, 1.0)
     f, triangle = jnp.linalg.qr(monomials(trend, (states - centre[None]) / scale[None]))
     return TrendBasis(trend, centre, scale, triangle), f
-
-
-def _check_rank(triangle: np.ndarray, trend: PolynomialTrend, shape: tuple[int, ...]) -> None:
-    singular_values = np.linalg.svd(triangle, compute_uv=False)
-    rank = int(np.sum(singular_values > RANK_TOLERANCE * singular_values[0]))
-    if rank < len(triangle):
-        raise ValueError(
-            f"`states` must determine all {len(triangle)} monomials of the trend of order {trend.order}; the "
-            f"{shape[0]} points have rank {rank}: they lie on a line or curve, as a steady sinusoidal motion does. "
-            "Take a simpler trend or add data of another amplitude."
-        )

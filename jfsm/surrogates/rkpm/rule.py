@@ -10,7 +10,7 @@ from ..._types import as_scalar
 from .basis import basis_size
 from .estimates import Rule
 from .interfaces import Interface, as_interfaces, regions
-from .nodes import Nodes, check_enough, check_rank
+from .nodes import Nodes, check_determined, check_enough
 from .windows import AbstractWindow, CubicSplineWindow
 
 NEIGHBOURS_PER_MONOMIAL = 8
@@ -52,7 +52,7 @@ def weighing_rule(
         own = np.asarray(nodes.states)[of_nodes == number]
         try:
             check_enough(own, order)
-            check_rank(own, order)
+            check_determined(own, order)
         except ValueError as error:
             raise ValueError(f"In one region between the interfaces `across`: {error}") from error
     return Rule(window, order, int(neighbours), share, across)
