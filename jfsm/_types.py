@@ -5,7 +5,9 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Float
+from numpy.typing import NDArray
 
 X64_MESSAGE = 'float64 data would be narrowed to float32; run `jax.config.update("jax_enable_x64", True)` first.'
 
@@ -58,3 +60,13 @@ def as_array(value: Any, name: str, ndim: int | tuple[int, ...]) -> np.ndarray:
             f"`{name}` must be finite; {bad} of {array.size} values are NaN or infinite. Remove or fill them."
         )
     return array
+
+
+def is_traced(tree: Any) -> bool:
+    """Whether any array of a tree is traced."""
+    return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(tree))
+
+
+def evenly_taken(count: int, most: int) -> NDArray[np.intp]:
+    """Indices of `most` rows out of `count`, or of all if there are fewer."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))

@@ -312,7 +312,7 @@ def test_ill_conditioned_neighbourhoods_are_solved_again_exactly():
     force_map = RKPM.fit(states, all_monomials(states, 3), neighbours=11)
     corners = np.array([[0.9, 1.4], [-0.9, 1.4], [0.0, 0.0], [0.9, -1.4]])
     nodes, rule = force_map.nodes, force_map.rule
-    tree = many.KDTree(np.asarray(nodes.states / nodes.scale[None]))
+    tree = many.search_tree(nodes)
     _, ratio = many._by_moments(tree, nodes, rule, corners, derivative_targets([(0, 0)], 3))
     assert np.any(ratio < many.TRUSTED_PIVOT_RATIO), "the case no longer tests what it is for"
     np.testing.assert_allclose(force_map.evaluate(corners), all_monomials(corners, 3), rtol=0, atol=1e-8)

@@ -7,6 +7,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
+from .._types import evenly_taken
 from ..dynamics._plant import direction, lower
 from ..estimation import latent_force
 from ..identification import Hypothesis, Nuisances, Posterior
@@ -51,7 +52,7 @@ def residual(structure: Structure, nuisances: Nuisances, until: int, at: tuple[i
     link = int(np.argmax(np.std(forces, axis=1))) if at is None else links.index(at)
     d, w, f = found.displacement @ rows[link], found.velocity @ rows[link], forces[link]
     count = min(until, n)
-    take = np.unique(np.linspace(0, count - 1, min(count, _NODES)).astype(int))
+    take = evenly_taken(count, _NODES)
     try:
         force_map = RKPM.fit(
             np.column_stack([d, w])[take], f[take], order=3, neighbours=min(_NEIGHBOURS, take.size // 2)
@@ -89,7 +90,7 @@ def table_of(found: Residual) -> HermiteTable | None:
 
 def curves(found: Residual, units, term: AbstractTerm | None) -> dict[str, Any]:
     """Points, map and law for the report, as plain lists."""
-    take = np.unique(np.linspace(0, found.force.size - 1, min(found.force.size, 1500)).astype(int))
+    take = evenly_taken(found.force.size, 1500)
     points = {
         "at": list(found.at),
         "displacement": found.displacement[take].tolist(),

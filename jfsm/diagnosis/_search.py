@@ -85,7 +85,7 @@ def groups(tried: Sequence[Candidate], own: Mapping[str, float] | None) -> list[
     for candidate in tried:
         begins = [None] if candidate.cause.is_sensor or own is None else [None, own]
         alone = lanes_of(candidate.starts[0]) == 1  # all starts of one candidate then, of which one climbs
-        lot = by_law.setdefault((candidate.cause.effect, id(candidate) if alone else None), [])
+        lot = by_law.setdefault((candidate.cause.effect, candidate if alone else None), [])
         lot += [(candidate, s, begin) for begin in begins for s in candidate.starts]
     return [lot[i : i + LANES] for lot in by_law.values() for i in range(0, len(lot), LANES)]
 

@@ -39,9 +39,8 @@ def bucket(n: int) -> int:
     return octave + math.ceil((n - octave) / (octave / 4)) * (octave // 4)
 
 
-def fastest_mode(structure: Structure) -> float:
+def fastest_mode(plant: Plant) -> float:
     """Largest natural frequency of the linear part [rad/s]; 0 where nothing is elastic."""
-    plant = lower(structure)
     eigenvalues = np.linalg.eigvals(np.linalg.solve(np.asarray(plant.mass), np.asarray(plant.stiffness)))
     return float(np.sqrt(np.max(np.abs(eigenvalues))))
 

@@ -87,8 +87,8 @@ def linearise_field(system: Field, state: np.ndarray) -> Linearisation:
             f"`model` must have a slope at the state {state.tolist()}; one of its terms has none there. "
             "Choose another state, or leave that term out with `model.without(term)`."
         )
-    minv, zero, one = np.asarray(system.minv), np.zeros_like(stiffness), np.eye(system.dof)
-    matrix = np.block([[zero, one], [-minv @ stiffness, -minv @ damping]])
+    minv = np.asarray(system.minv)
+    matrix = state_matrix(minv @ stiffness, minv @ damping)
     eigenvalues, vectors = np.linalg.eig(matrix)
     order = np.lexsort((np.imag(eigenvalues), np.round(np.abs(eigenvalues), 12)))
     eigenvalues, vectors = eigenvalues[order], vectors[:, order]
@@ -106,6 +106,12 @@ def linearise_field(system: Field, state: np.ndarray) -> Linearisation:
         stiffness=stiffness,
         damping=damping,
     )
+
+
+def state_matrix(stiffness: np.ndarray, damping: np.ndarray) -> np.ndarray:
+    """Matrix of y' = matrix y, y = (x, v), from stiffness and damping (..., dof, dof) over the mass."""
+    one = np.broadcast_to(np.eye(stiffness.shape[-1]), stiffness.shape)
+    return np.block([[np.zeros_like(stiffness), one], [-stiffness, -damping]])
 
 
 def tangent(system: Field, state: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -26,6 +26,7 @@ from ._excitation import (
     typical_speed,
 )
 from ._grid import Fine, free_run
+from ._linearise import state_matrix
 from ._plant import Grid, Plant, Slots, lower
 from ._simulate import check_pair, escapes, finer, motion_bound, with_tables
 
@@ -203,9 +204,7 @@ def _fastest(structures: Sequence[Structure], record: Record) -> list[Structure]
     """Of each measure that the number of steps goes by, the structure that needs most; the rest need not be asked."""
     plants, speed = _lowered(structures, Grid(record.dt, 1)), typical_speed(record)
     mass, damping, stiffness = (np.asarray(q) for q in (plants.mass, plants.damping, plants.stiffness))
-    zero, one = np.zeros_like(mass), np.broadcast_to(np.eye(mass.shape[-1]), mass.shape)
-    linear = np.block([[zero, one], [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)]])
-    slopes = [linear]
+    slopes = [state_matrix(np.linalg.solve(mass, stiffness), np.linalg.solve(mass, damping))]
     if len(plants.smooth) or len(plants.memory):
         probes = [jnp.full(mass.shape[-1], share * speed) for share, _ in PROBES]
         slopes += [np.asarray(_jacobians(plants, v)) for v in probes]

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..dynamics import lower
+from ..dynamics._linearise import state_matrix
 from ..dynamics._plant import direction
 from ..structures import Structure
 
@@ -34,9 +35,8 @@ class _Linear:
         plant = lower(model)
         self.dof, self.minv = model.dof, np.linalg.inv(np.asarray(plant.mass))
         k, c = self.minv @ np.asarray(plant.stiffness), self.minv @ np.asarray(plant.damping)
-        zero, eye = np.zeros_like(k), np.eye(model.dof)
-        self.omega = max(float(np.max(np.abs(np.linalg.eigvals(np.block([[zero, eye], [-k, -c]]))))), 1e-300)
-        self.rate = np.block([[zero, eye], [-k / self.omega**2, -c / self.omega]])
+        self.omega = max(float(np.max(np.abs(np.linalg.eigvals(state_matrix(k, c))))), 1e-300)
+        self.rate = state_matrix(k / self.omega**2, c / self.omega)
 
     def rows(self, channels: Sequence[Channel]) -> np.ndarray:
         blocks = {"displacement": 0, "velocity": self.dof}

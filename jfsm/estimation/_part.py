@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..dynamics import lower
-from ..dynamics._excitation import bucket, measured_force
+from ..dynamics._excitation import bucket, fastest_mode, measured_force
 from ..dynamics._plant import Plant, direction
 from ..records import Record, clipped, noise_floor, spikes
 from ..structures import Structure
@@ -86,7 +86,7 @@ class Part:
         floors = [noise_floor(seen[:, i], dt) for i in range(len(channels))]
         smooth = [floor.smooth - np.mean(floor.smooth) for floor in floors]
         rate = np.median([np.std(np.diff(y)) / (dt * max(np.std(y), 1e-300)) for y in smooth])
-        omega = float(rate) if matrices is None else float(np.sqrt(np.max(np.abs(np.linalg.eigvals(matrices[0])))))
+        omega = float(rate) if plant is None else fastest_mode(plant)
         omega = min(max(omega, 2 * np.pi / (n * dt)), np.pi / dt)
         spread = np.maximum(np.std(seen, 0), 1e-300)
         orders = np.array([_RESPONSES.index(kind) for kind, _ in channels])

@@ -17,7 +17,7 @@ from ..dynamics._excitation import (
     typical_speed,
 )
 from ..dynamics._grid import Fine
-from ..dynamics._plant import Channel, Readout, readout
+from ..dynamics._plant import Channel, Readout, lower, readout
 from ..dynamics._simulate import check_pair
 from ..dynamics._start import starting_state
 from ..estimation._filter import ProcessNoise, Readings
@@ -132,7 +132,7 @@ def prepare(
             raise ValueError(f"`{channel[0]}` {channel[1]} is constant; leave a dead channel out of the record.")
     use, floor, trusted, torn = _noise(channels, values, spread, record.dt)
     force, force_variance, share, words = _force(record, model)
-    omega = fastest_mode(model) or _rate(values[:, 0], record.dt)
+    omega = fastest_mode(lower(model)) or _rate(values[:, 0], record.dt)
     length, crest = _size(channels, values, spread, omega)
     masses = np.asarray((weighed or model).mass)
     mass = np.diag(masses) if masses.ndim == 1 else masses

@@ -1,10 +1,10 @@
 """What the data say: force state maps, each a term without a formula."""
 
-from ._discontinuities import Discontinuity as Discontinuity
-from ._discontinuities import find_discontinuities as find_discontinuities
 from ._map import AbstractForceStateMap as AbstractForceStateMap
 from ._table import HermiteTable as HermiteTable
 from ._table import tabulate as tabulate
+from .discontinuities import Discontinuity as Discontinuity
+from .discontinuities import find_discontinuities as find_discontinuities
 from .kriging import AbstractCorrelation as AbstractCorrelation
 from .kriging import Cubic as Cubic
 from .kriging import Exponential as Exponential

@@ -8,12 +8,10 @@ from numpy.typing import NDArray
 SMALLEST = 64
 
 
-def padded_blocks(
-    rows: NDArray[np.float64], largest: int, smallest: int = SMALLEST
-) -> Iterator[tuple[NDArray[np.float64], int]]:
+def padded_blocks(rows: NDArray[np.float64], largest: int) -> Iterator[tuple[NDArray[np.float64], int]]:
     """Blocks of at most `largest` rows, each with its number of true rows; the last row fills up the rest."""
-    largest = max(smallest, 1 << (largest.bit_length() - 1))
+    largest = max(SMALLEST, 1 << (largest.bit_length() - 1))
     for start in range(0, len(rows), largest):
         block = rows[start : start + largest]
-        length = max(smallest, 1 << (len(block) - 1).bit_length())
+        length = max(SMALLEST, 1 << (len(block) - 1).bit_length())
         yield np.concatenate([block, np.repeat(block[-1:], length - len(block), axis=0)]), len(block)

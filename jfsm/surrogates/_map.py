@@ -92,7 +92,3 @@ class AbstractForceStateMap(eqx.Module):
                 "Use `evaluate` or `jax.vmap` for many."
             )
         return state
-
-    def _axes(self) -> list[tuple[int, ...]]:
-        """The first derivatives, in the order of the columns."""
-        return [tuple(int(i == axis) for i in range(self.dim)) for axis in range(self.dim)]

@@ -6,18 +6,19 @@ from typing import Any
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Float
 
+from .._types import is_traced
 from ._differentiate import mixed_derivative
-from ._scattered import AbstractScatteredMap, whole_number
+from ._scattered import AbstractScatteredMap
 from .rkpm.basis import MultiIndex
-from .rkpm.estimates import Rule
 from .rkpm.interfaces import Interface
-from .rkpm.nodes import Nodes, prepare_nodes
+from .rkpm.nodes import Nodes
 from .rkpm.rkpm import RKPM
-from .rkpm.rule import weighing_rule
 from .rkpm.windows import AbstractWindow, QuarticSplineWindow
+
+BATCH = 64
+"""States whose neighbourhoods are held at once."""
 
 
 class MovingLeastSquares(AbstractScatteredMap):
@@ -34,8 +35,8 @@ class MovingLeastSquares(AbstractScatteredMap):
     .. [1] T. Belytschko et al., Comput. Methods Appl. Mech. Engrg. 139 (1996) 3-47.
     """
 
-    nodes: Nodes
-    rule: Rule
+    values: RKPM
+    """Its derivatives are not those of this map."""
 
     @classmethod
     def fit(
@@ -52,47 +53,45 @@ class MovingLeastSquares(AbstractScatteredMap):
 
         The window is `QuarticSplineWindow` when None.
         """
-        order = whole_number(order, "order", 1)
-        nodes = prepare_nodes(states, force, order)
         window = QuarticSplineWindow() if window is None else window
-        return cls(nodes, weighing_rule(nodes, order, neighbours, window, dilation, across))
+        values = RKPM.fit(states, force, order, neighbours, window, dilation, across)
+        return cls(values)  # pyright: ignore[reportCallIssue]  (takes the property `nodes` for a field)
 
     @property
-    def _values(self) -> RKPM:
-        return RKPM(self.nodes, self.rule)
+    def nodes(self) -> Nodes:
+        return self.values.nodes
 
     def __call__(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
         """Restoring force at one state; a RuntimeError where the nodes around it are in degenerate position."""
-        return self._values(state)
+        return self.values(state)
 
     def gradient(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs dim"]:
         """First derivatives of the map at one state."""
-        return _gradient(self._values, self._state(state))
+        return _gradient(self.values, self._state(state))
 
     def derivative(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
         """Derivative of the map at one state; ``orders=(2, 0)`` is the second one in the first column.
 
         The window has two continuous derivatives: from the third on they jump at the edge of every node's support.
         """
-        return _derivative(self._values, self._state(state), self._orders(orders, self.rule.order))
+        return _derivative(self.values, self._state(state), self._orders(orders, self.values.rule.order))
 
     def std(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
         """Standard error of the force at one state, as `RKPM.std`."""
-        return self._values.std(state)
+        return self.values.std(state)
 
     def evaluate_derivatives(
         self, states: Float[ArrayLike, "q dim"], orders: Sequence[MultiIndex]
     ) -> Float[Array, "q derivatives *outputs"]:
         """Several derivatives at many states; the force itself is evaluated as fast as that of `RKPM`."""
-        traced = any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves((states, self)))
-        checked = [self._orders(one, self.rule.order) for one in orders]
-        states = states if traced else self._states(states)
+        checked = [self._orders(one, self.values.rule.order) for one in orders]
+        states = states if is_traced((states, self)) else self._states(states)
         columns = []
         for one in checked:
             if any(one):
-                columns.append(_many_derivatives(self._values, jnp.asarray(states), one))
+                columns.append(_many_derivatives(self.values, jnp.asarray(states), one))
             else:
-                columns.append(self._values.evaluate(states))
+                columns.append(self.values.evaluate(states))
         return jnp.stack(columns, axis=1)
 
 
@@ -109,7 +108,3 @@ def _derivative(values: RKPM, state: Float[Array, " dim"], orders: MultiIndex) -
 @eqx.filter_jit
 def _many_derivatives(values: RKPM, states: Float[Array, "q dim"], orders: MultiIndex) -> Float[Array, "q *outputs"]:
     return jax.lax.map(mixed_derivative(values, orders), states, batch_size=min(BATCH, max(len(states), 1)))
-
-
-BATCH = 64
-"""States whose neighbourhoods are held at once."""

@@ -12,7 +12,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from ._differentiate import mixed_derivative
 from ._scattered import AbstractScatteredMap, whole_number
-from .rkpm.basis import MultiIndex, basis_size, chebyshev_polynomials
+from .rkpm.basis import MultiIndex, basis_size, chebyshev_polynomials, first_derivatives
 from .rkpm.nodes import Nodes, prepare_nodes
 
 
@@ -58,7 +58,7 @@ class Polynomial(AbstractScatteredMap):
 
     def gradient(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs dim"]:
         """First derivatives of the polynomial at one state."""
-        return jnp.stack([_derivative(self, self._state(state), axis) for axis in self._axes()], axis=-1)
+        return jnp.stack([_derivative(self, self._state(state), axis) for axis in first_derivatives(self.dim)], axis=-1)
 
     def derivative(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
         """Derivative of the polynomial at one state."""

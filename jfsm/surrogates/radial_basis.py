@@ -9,19 +9,16 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Float
-from scipy.spatial import KDTree
 
-from .._types import as_scalar
+from .._types import as_scalar, is_traced
 from ._differentiate import mixed_derivative
 from ._scattered import AbstractScatteredMap, whole_number
-from .rkpm.basis import MultiIndex, basis_size, monomials
-from .rkpm.estimates import Neighbourhood
-from .rkpm.many import neighbourhoods
+from .rkpm.basis import MultiIndex, basis_size, first_derivatives, monomials
+from .rkpm.estimates import Neighbourhood, nearest_nodes
+from .rkpm.many import neighbourhoods, search_tree
 from .rkpm.nodes import Nodes, prepare_nodes
 
 NEIGHBOURS_PER_MONOMIAL = 5
-LARGEST_WORK = 2**21
-"""Numbers in flight at once, states × neighbours²."""
 
 
 class RadialBasis(AbstractScatteredMap):
@@ -87,7 +84,7 @@ class RadialBasis(AbstractScatteredMap):
 
     def gradient(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs dim"]:
         """First derivatives of the local spline at one state."""
-        return jnp.moveaxis(_derivatives(self, self._state(state), tuple(self._axes())), 0, -1)
+        return jnp.moveaxis(_derivatives(self, self._state(state), first_derivatives(self.dim)), 0, -1)
 
     def derivative(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
         """Derivative of the local spline at one state; its orders sum to the map's order at most."""
@@ -116,14 +113,13 @@ class RadialBasis(AbstractScatteredMap):
     ) -> Float[Array, "q derivatives *outputs"]:
         """Several derivatives at many states: one local system each serves all of them."""
         checked = tuple(self._orders(one, self.order) for one in orders)
-        if any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves((states, self))):
+        if is_traced((states, self)):
             return jax.vmap(lambda state: _derivatives(self, self._state(state), checked))(jnp.asarray(states))
         states, outputs = self._states(states), self.nodes.force.shape[1:]
-        tree = KDTree(np.asarray(self.nodes.states) / np.asarray(self.nodes.scale))
-        largest = LARGEST_WORK // self.neighbours**2
+        tree, work = search_tree(self.nodes), self.neighbours**2
         parts = [
             np.asarray(_block_derivatives(self, around, block, checked))[:length]
-            for around, block, length in neighbourhoods(tree, self.nodes, self.neighbours, states, largest)
+            for around, block, length in neighbourhoods(tree, self.nodes, self.neighbours, states, work)
         ]
         found = np.concatenate(parts) if parts else np.zeros((0, len(checked), 1))
         return jnp.asarray(found.reshape(len(states), len(checked), *outputs))
@@ -160,13 +156,6 @@ class _Local:
         return jnp.linalg.solve(self.matrix, jnp.pad(values, ((0, self.matrix.shape[0] - values.shape[0]), (0, 0))))
 
 
-def _nearest(force_map: RadialBasis, state: Float[Array, " dim"]) -> Neighbourhood:
-    nodes = force_map.nodes
-    offsets = jax.lax.stop_gradient((state[None, :] - nodes.states) / nodes.scale[None, :])
-    _, chosen = jax.lax.top_k(-jnp.sum(offsets**2, axis=1), force_map.neighbours)
-    return Neighbourhood(nodes.states[chosen], nodes.force[chosen], nodes.multiplicity[chosen])
-
-
 def _local_derivatives(
     force_map: RadialBasis, near: Neighbourhood, state: Float[Array, " dim"], orders: tuple[MultiIndex, ...]
 ) -> Float[Array, "derivatives *outputs"]:
@@ -180,7 +169,8 @@ def _local_derivatives(
 def _derivatives(
     force_map: RadialBasis, state: Float[Array, " dim"], orders: tuple[MultiIndex, ...]
 ) -> Float[Array, "derivatives *outputs"]:
-    return _local_derivatives(force_map, _nearest(force_map, state), state, orders)
+    near = nearest_nodes(force_map.nodes, state, force_map.neighbours)
+    return _local_derivatives(force_map, near, state, orders)
 
 
 @eqx.filter_jit
@@ -192,7 +182,7 @@ def _block_derivatives(
 
 @eqx.filter_jit
 def _standard_error(force_map: RadialBasis, state: Float[Array, " dim"]) -> Float[Array, "*outputs"]:
-    near = _nearest(force_map, state)
+    near = nearest_nodes(force_map.nodes, state, force_map.neighbours)
     local = _Local(force_map, near, state)
     force = near.force.reshape(near.force.shape[0], -1)
     weights = local.solve(force)[: force.shape[0]]

@@ -1,6 +1,6 @@
 """From readings to a conditioned field: merged if many, searched, and weighed again for noise in the states."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._types import as_array
+from ..rkpm.basis import first_derivatives
 from .correlations import AbstractCorrelation
 from .likelihood import Readings
 from .posterior import Posterior, condition, derivatives_at
@@ -205,14 +206,10 @@ def _search(readings: Readings, options: Options, start: NDArray[np.float64] | N
         return _trend_alone(readings, options)
     unit = unit[moving]
     known = readings.noise_variance
-    scaled = Readings(
-        states=readings.states,
-        basis=readings.basis,
+    scaled = replace(
+        readings,
         force=jnp.asarray(rest[:, moving] / unit),  # the likelihood does not depend on what the trend explains
-        relative_noise=readings.relative_noise,
-        correlation=readings.correlation,
         noise_variance=None if known is None else jnp.asarray(np.asarray(known)[moving] / unit**2),
-        restricted=readings.restricted,
     )
     optimum = search(scaled, options.length_scale, options.nugget, start)
     n, p = basis.shape
@@ -237,18 +234,9 @@ def _weighed(readings: Readings, posterior: Posterior, relative_noise: Any, stat
     -----
     Σ_k (∂f/∂x_k)² Var[x_k], averaged over the outputs, over the noise variance of a reading of relative noise one.
     """
-    dim = readings.states.shape[1]
-    axes = tuple(tuple(int(i == k) for i in range(dim)) for k in range(dim))
+    axes = first_derivatives(readings.states.shape[1])
     slopes = np.asarray(derivatives_at(posterior, readings.states, axes))
     made = np.einsum("nko,nk->no", slopes**2, state_variance)
     noise = np.asarray(posterior.nugget * posterior.process_variance)
     added = np.mean(made / noise, axis=1)
-    return Readings(
-        readings.states,
-        readings.basis,
-        readings.force,
-        jnp.asarray(relative_noise + added),
-        readings.correlation,
-        readings.noise_variance,
-        readings.restricted,
-    )
+    return replace(readings, relative_noise=jnp.asarray(relative_noise + added))

@@ -1,5 +1,6 @@
 """Force state map by universal kriging."""
 
+import math
 from collections.abc import Sequence
 from typing import Any, Literal
 
@@ -11,10 +12,11 @@ from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Bool, Float
 from numpy.typing import NDArray
 
-from ..._types import as_array, require_x64
+from ..._types import as_array, is_traced, require_x64
 from .._blocks import padded_blocks
 from .._map import AbstractForceStateMap
 from .._readings import reach_of, within
+from ..rkpm.basis import first_derivatives
 from .correlations import AbstractCorrelation, Gaussian
 from .fitting import Options, Part, fit_part
 from .leave_one_out import LeaveOneOut
@@ -211,7 +213,7 @@ class Kriging(AbstractForceStateMap):
         origin = jnp.zeros((1, self.dim))
         found = []
         for exponents in self.parts[0].trend.trend.exponents(self.dim):
-            factorial = float(np.prod([np.prod(np.arange(1, e + 1)) for e in exponents]))
+            factorial = math.prod(map(math.factorial, exponents))
             rows = [part.trend(origin, exponents)[0] @ part.trend_coefficients / factorial for part in self.parts]
             found.append(self._joined(rows))
         return jnp.stack(found)
@@ -222,7 +224,7 @@ class Kriging(AbstractForceStateMap):
 
     def gradient(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs dim"]:
         """First derivatives of the map at one state."""
-        return jnp.moveaxis(self._derivatives(self._state(state)[None], tuple(self._axes()))[0], 0, -1)
+        return jnp.moveaxis(self._derivatives(self._state(state)[None], first_derivatives(self.dim))[0], 0, -1)
 
     def derivative(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
         """Derivative of the map at one state, from the derivative of the correlation; ``orders=(1, 1)`` is ∂²f/∂x∂v.
@@ -280,7 +282,7 @@ class Kriging(AbstractForceStateMap):
         """Force at the states in `count` maps that are as plausible as this one."""
         where = jnp.asarray(self._states(states))
         keys = jax.random.split(key, len(self.parts))
-        drawn = [_draw(part, where, count, one) for part, one in zip(self.parts, keys, strict=True)]
+        drawn = [draw(part, where, count, one) for part, one in zip(self.parts, keys, strict=True)]
         return self._joined(drawn)
 
     def _derivatives(self, states: Float[Array, "q dim"], orders: tuple[Orders, ...]) -> Array:
@@ -307,7 +309,7 @@ class Kriging(AbstractForceStateMap):
         return jnp.asarray(np.concatenate(found) if found else np.zeros(shape))
 
     def _traced(self, states: Any) -> bool:
-        return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves((states, self.parts)))
+        return is_traced((states, self.parts))
 
     @property
     def _value(self) -> Orders:
@@ -354,9 +356,6 @@ def _likelihood(log_parameters, states, force, correlation, trend, restricted):
     columns = force.reshape(len(states), -1)
     readings = Readings(states, basis, columns, jnp.ones(len(states)), correlation, None, restricted)
     return _negative_log_likelihood(log_parameters, readings, jnp.zeros(()))
-
-
-_draw = eqx.filter_jit(draw)
 
 
 def _scaled(part: Posterior) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -45,18 +45,14 @@ class Posterior(eqx.Module):
 
     def standard_errors(self, states: Float[Array, "q dim"], orders: Orders) -> Float[Array, "q outputs"]:
         """Standard error of the force, or of its derivative, with that of the trend coefficients in it."""
-        trend, correlation = self._at(states, orders)
-        explained = solve_triangular(self.factor, correlation.T, lower=True)  # L⁻¹r
-        unexplained = solve_triangular(self.triangle, trend.T - self._trend_of(explained), trans=1)
+        explained, unexplained = self._prediction(states, orders)
         share = self.correlation.variance_of_derivative(self.length_scale, orders)
         share = share - jnp.sum(explained**2, axis=0) + jnp.sum(unexplained**2, axis=0)
         return jnp.sqrt(jnp.maximum(share, 0.0)[:, None] * self.unbiased_variance[None])
 
     def covariance(self, states: Float[Array, "q dim"]) -> Float[Array, "q q"]:
         """Covariance of the force between states, over the process variance."""
-        trend, correlation = self._at(states, (0,) * states.shape[1])
-        explained = solve_triangular(self.factor, correlation.T, lower=True)
-        unexplained = solve_triangular(self.triangle, trend.T - self._trend_of(explained), trans=1)
+        explained, unexplained = self._prediction(states, (0,) * states.shape[1])
         prior = self.correlation.between(states, states, self.length_scale)
         return prior - explained.T @ explained + unexplained.T @ unexplained
 
@@ -77,9 +73,13 @@ class Posterior(eqx.Module):
         """σ² over n - p, which is what error bars need: eq. 66 divides by n."""
         return self.process_variance * self.unbias
 
-    def _trend_of(self, explained: Float[Array, "n q"]) -> Float[Array, "p q"]:
-        """FᵀK⁻¹r."""
-        return self.triangle.T @ (self.basis.T @ explained)
+    def _prediction(self, states: Float[Array, "q dim"], orders: Orders) -> tuple[Array, Array]:
+        """L⁻¹r (n, q), whose squares the readings explain of the variance, and T⁻ᵀ(f - FᵀK⁻¹r) (p, q), whose squares
+        the trend coefficients add to it."""
+        trend, correlation = self._at(states, orders)
+        explained = solve_triangular(self.factor, correlation.T, lower=True)
+        trend_of = self.triangle.T @ (self.basis.T @ explained)  # FᵀK⁻¹r
+        return explained, solve_triangular(self.triangle, trend.T - trend_of, trans=1)
 
     def _at(self, states: Float[Array, "q dim"], orders: Orders) -> tuple[Array, Array]:
         return self.trend(states, orders), self.correlation.between(states, self.states, self.length_scale, orders)
@@ -114,19 +114,12 @@ def condition(
     )
 
 
-@eqx.filter_jit
-def derivatives_at(posterior: Posterior, states: Float[Array, "q dim"], orders: tuple[Orders, ...]) -> Array:
-    return posterior.derivatives(states, orders)
-
-
-@eqx.filter_jit
-def standard_errors_at(posterior: Posterior, states: Float[Array, "q dim"], orders: Orders) -> Array:
-    return posterior.standard_errors(states, orders)
-
-
+derivatives_at = eqx.filter_jit(Posterior.derivatives)
+standard_errors_at = eqx.filter_jit(Posterior.standard_errors)
 left_out = eqx.filter_jit(Posterior.left_out)
 
 
+@eqx.filter_jit
 def draw(
     posterior: Posterior, states: Float[Array, "q dim"], count: int, key: Array
 ) -> Float[Array, "count q outputs"]:

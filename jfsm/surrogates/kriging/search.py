@@ -1,5 +1,6 @@
 """Hyper-parameters of largest likelihood, from a few starts, within bounds whose meaning is told."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import equinox as eqx
@@ -155,18 +156,10 @@ _value_and_gradient = eqx.filter_jit(eqx.filter_value_and_grad(negative_log_like
 
 def _part(readings: Readings, rows: NDArray[np.intp]) -> Readings:
     rows = np.sort(rows)
-    basis, _ = np.linalg.qr(np.asarray(readings.basis)[rows])
-    columns = (readings.states, readings.force, readings.relative_noise)
-    states, force, relative_noise = (jnp.asarray(np.asarray(column)[rows]) for column in columns)
-    return Readings(
-        states,
-        jnp.asarray(basis),
-        force,
-        relative_noise,
-        readings.correlation,
-        readings.noise_variance,
-        readings.restricted,
-    )
+    names = ("states", "basis", "force", "relative_noise")
+    taken = {name: np.asarray(getattr(readings, name))[rows] for name in names}
+    taken["basis"] = np.linalg.qr(taken["basis"])[0]
+    return replace(readings, **{name: jnp.asarray(column) for name, column in taken.items()})
 
 
 def _distinct(found: list[tuple[NDArray[np.float64], float]]) -> list[NDArray[np.float64]]:

@@ -69,11 +69,10 @@ class TrendBasis(eqx.Module):
     scale: Float[Array, " dim"]
     triangle: Float[Array, "p p"]
 
-    def __call__(self, states: Float[Array, "q dim"], orders: tuple[int, ...] | None = None) -> Float[Array, "q p"]:
-        """Every function at every state, or its derivative by the columns."""
+    def __call__(self, states: Float[Array, "q dim"], orders: tuple[int, ...]) -> Float[Array, "q p"]:
+        """Derivative of every function by the columns, at every state; orders of zero mean the function itself."""
         raw = monomials(self.trend, (states - self.centre[None]) / self.scale[None], orders)
-        if orders is not None:
-            raw = raw / jnp.prod(self.scale ** jnp.asarray(orders))
+        raw = raw / jnp.prod(self.scale ** jnp.asarray(orders))
         return solve_triangular(self.triangle, raw.T, trans=1, lower=False).T
 
 

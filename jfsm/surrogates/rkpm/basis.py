@@ -26,6 +26,11 @@ def multi_indices(dim: int, order: int) -> tuple[MultiIndex, ...]:
     return tuple(sorted(within, key=lambda exponents: (sum(exponents), *(-e for e in exponents))))
 
 
+def first_derivatives(dim: int) -> tuple[MultiIndex, ...]:
+    """Orders of the first derivatives, in the order of the columns."""
+    return multi_indices(dim, 1)[1:]
+
+
 def monomial_columns(coordinates: Sequence[Float[Array, "*shape"]], order: int) -> list[Float[Array, "*shape"]]:
     """Every monomial as an array of its own; each is one product of an earlier one, so no power of zero is formed."""
     columns: dict[MultiIndex, Float[Array, "*shape"]] = {}

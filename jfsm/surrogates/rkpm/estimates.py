@@ -38,16 +38,18 @@ class Neighbourhood(NamedTuple):
     multiplicity: Float[Array, " near"]
 
 
-def nearest_nodes(nodes: Nodes, rule: Rule, state: Float[Array, " dim"]) -> Neighbourhood:
+def nearest_nodes(
+    nodes: Nodes, state: Float[Array, " dim"], count: int, across: tuple[Interface, ...] = ()
+) -> Neighbourhood:
     """Neighbours of one state by brute force over all nodes of its region: traceable, O(nodes)."""
     offsets = jax.lax.stop_gradient((state[None, :] - nodes.states) / nodes.scale[None, :])
     squared = jnp.sum(offsets**2, axis=1)
-    if rule.across:  # I_Ω of eq. 48
-        home = jax.vmap(lambda node: region(node, rule.across))(nodes.states) == region(state, rule.across)
+    if across:  # I_Ω of eq. 48
+        home = jax.vmap(lambda node: region(node, across))(nodes.states) == region(state, across)
         squared = jnp.where(home, squared, jnp.inf)
-    least, chosen = jax.lax.top_k(-squared, gathered_nodes(rule.neighbours, len(nodes)))
+    least, chosen = jax.lax.top_k(-squared, count)
     states = nodes.states[chosen]
-    if rule.across:  # where the region has no more nodes, the rest stands at the edge of the support and weighs nothing
+    if across:  # where the region has no more nodes, the rest stands at the edge of the support and weighs nothing
         inside = jnp.isfinite(least)
         farthest = states[jnp.maximum(jnp.sum(inside) - 1, 0)]
         states = jnp.where(inside[:, None], states, (state + BEYOND * (farthest - state))[None, :])

@@ -9,13 +9,12 @@ import numpy as np
 from jax.scipy.linalg import solve_triangular
 from jaxtyping import Array, Float, Int
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from .basis import basis_size, monomials
 from .estimates import Neighbourhood, Rule
-from .many import LARGEST_WORK, apart, neighbourhoods
+from .many import apart, neighbourhoods, search_tree
 from .nodes import Nodes
-from .shape_functions import moment_matrix, window_weights
+from .shape_functions import moment_matrix, safe_root, window_weights
 from .support import BEYOND
 
 RIDGE = 1e-13
@@ -37,11 +36,10 @@ def leave_one_out_errors(
     errors = np.zeros((len(neighbours), len(chosen), int(np.prod(nodes.force.shape[1:], dtype=int))))
     for inside, where in apart(nodes, rule, states):
         near = min(max(neighbours) + 1, len(inside))
-        tree = KDTree(np.asarray(inside.states) / np.asarray(inside.scale))
-        block_length = LARGEST_WORK // (near * basis_size(nodes.dim, rule.order))
+        work = near * basis_size(nodes.dim, rule.order)
         parts = [
             np.asarray(_errors(around, block, inside.scale, jnp.asarray(list(neighbours)), rule))[:, :length]
-            for around, block, length in neighbourhoods(tree, inside, near, states[where], block_length)
+            for around, block, length in neighbourhoods(search_tree(inside), inside, near, states[where], work)
         ]
         errors[:, where] = np.concatenate(parts, axis=1)
     return errors
@@ -75,9 +73,7 @@ def error_at_node(
     :math:`e_i = (u_i - u^a(x_i)) / (1 - \psi_i(x_i))`, exact for a local fit whose support stays.
     """
     offsets = (state[None, :] - near.states) / scale[None, :]
-    squared = jnp.sum(offsets**2, axis=1)
-    away = squared > 0.0
-    distance = jnp.where(away, jnp.sqrt(jnp.where(away, squared, 1.0)), 0.0)
+    distance = safe_root(jnp.sum(offsets**2, axis=1))
     ends = jnp.append(distance, BEYOND * distance[-1])  # as `support_radius`, with the count as data
     z = offsets * rule.window.radius / (rule.dilation * ends[jnp.minimum(support, len(distance))])
     weight = window_weights(z, rule.window) * near.multiplicity

@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from ..._types import is_traced
 from .._blocks import padded_blocks
 from .basis import DerivativeTargets, basis_size
 from .estimates import SINGULAR, Neighbourhood, Rule, basis_at, degenerate_message, derivatives_at
@@ -25,7 +26,7 @@ TRUSTED_PIVOT_RATIO = 1e-2
 a two-tone motion with one neighbour to spare; at 1e-3 to 1e-7 only. QR keeps 1e-10 at every ratio met there."""
 
 LARGEST_WORK = 2**21
-"""Numbers in flight at once, states × neighbours × monomials: 16 MiB, so that a block stays near the cache."""
+"""Numbers in flight at once, such as states × neighbours × monomials: 16 MiB, so that a block stays near the cache."""
 
 LARGEST_FACTORISED = 256
 """States in one block of factorisations: from 512 on XLA's pool of two threads waits for itself and never ends."""
@@ -72,7 +73,7 @@ def apart(nodes: Nodes, rule: Rule, states: NDArray[np.float64]) -> Iterator[tup
 def _evaluate_region(
     nodes: Nodes, rule: Rule, states: NDArray[np.float64], targets: DerivativeTargets
 ) -> Float[Array, "q derivatives outputs"]:
-    tree = KDTree(np.asarray(nodes.states) / np.asarray(nodes.scale))
+    tree = search_tree(nodes)
     estimates, ratio = _by_moments(tree, nodes, rule, states, targets)
     doubtful = np.flatnonzero(ratio < TRUSTED_PIVOT_RATIO)
     if doubtful.size:
@@ -94,7 +95,8 @@ def _by_moments(
     scale, multiplicity = np.asarray(nodes.scale), np.asarray(nodes.multiplicity)
     force = nodes.force.reshape(len(nodes), -1)
     estimates, ratios = [np.zeros((0, len(targets.orders), force.shape[1]))], [np.zeros(0)]
-    for block, length in padded_blocks(states, _block_length(nodes, rule, rule.neighbours)):
+    largest = LARGEST_WORK // (rule.neighbours * basis_size(nodes.dim, rule.order))
+    for block, length in padded_blocks(states, largest):
         distance, index = _nearest(tree, block / scale, min(rule.neighbours + 1, len(nodes)))
         index = index[:, : rule.neighbours]
         block_estimates, ratio = moment_estimates(
@@ -116,25 +118,32 @@ def _by_factorisation(
 ) -> tuple[Float[Array, "q derivatives outputs"], NDArray[np.float64]]:
     """Exact estimates with supports that grow, each with the conditioning of its basis."""
     near = gathered_nodes(rule.neighbours, len(nodes))
+    work = near * basis_size(nodes.dim, rule.order)
     parts = [
         (_first(estimates, length), np.asarray(conditioning)[:length])
-        for around, block, length in neighbourhoods(tree, nodes, near, states, _block_length(nodes, rule, near))
+        for around, block, length in neighbourhoods(tree, nodes, near, states, work)
         for estimates, conditioning in [_exact_estimates(around, nodes.scale, rule, block, targets)]
     ]
     estimates, conditionings = zip(*parts, strict=True)
     return _joined(list(estimates)), np.concatenate(conditionings)
 
 
-def neighbourhoods(
-    tree: KDTree, nodes: Nodes, count: int, states: NDArray[np.float64], largest: int
-) -> Iterator[tuple[Neighbourhood, Float[Array, "block dim"], int]]:
-    """Blocks of at most `largest` states with their `count` nearest nodes; the last number counts the true states.
+def search_tree(nodes: Nodes) -> KDTree:
+    """Tree of the nodes, each column in units of its scale."""
+    return KDTree(np.asarray(nodes.states) / np.asarray(nodes.scale))
 
-    Blocks are small enough to be factorised. The force of each neighbourhood is (block, count, outputs).
+
+def neighbourhoods(
+    tree: KDTree, nodes: Nodes, count: int, states: NDArray[np.float64], work: int
+) -> Iterator[tuple[Neighbourhood, Float[Array, "block dim"], int]]:
+    """Blocks of states with their `count` nearest nodes; the last number counts the true states.
+
+    A state takes `work` numbers. Blocks are small enough to be factorised. The force of each neighbourhood is
+    (block, count, outputs).
     """
     node_states, multiplicity = np.asarray(nodes.states), np.asarray(nodes.multiplicity)
     force = nodes.force.reshape(len(nodes), -1)
-    for block, length in padded_blocks(states, min(largest, LARGEST_FACTORISED)):
+    for block, length in padded_blocks(states, min(LARGEST_WORK // work, LARGEST_FACTORISED)):
         _, index = _nearest(tree, block / np.asarray(nodes.scale), count)
         around = Neighbourhood(jnp.asarray(node_states[index]), _take(force, index), jnp.asarray(multiplicity[index]))
         yield around, jnp.asarray(block), length
@@ -155,11 +164,6 @@ def _exact_estimates(
     return jax.vmap(one)(around, states)
 
 
-def _block_length(nodes: Nodes, rule: Rule, near: int) -> int:
-    """Most states in one block, by the memory that their neighbourhoods take."""
-    return LARGEST_WORK // (near * basis_size(nodes.dim, rule.order))
-
-
 def _nearest(tree: KDTree, points: NDArray[np.float64], count: int) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
     """Distances and indices of the `count` nearest nodes of each point; a basis needs at least two."""
     distance, index = tree.query(points, count, workers=-1)
@@ -173,7 +177,7 @@ def _take(force: Float[Array, "nodes *outputs"], index: NDArray[np.intp]) -> Arr
 
 def _placed(values: Any, where: NDArray[np.intp], part: Any) -> Any:
     """Rows `where` replaced by `part`; on the host unless one is traced."""
-    if isinstance(values, Tracer) or isinstance(part, Tracer):
+    if is_traced((values, part)):
         return jnp.asarray(values).at[where].set(part)
     values = np.array(values)
     values[where] = np.asarray(part)
@@ -186,5 +190,4 @@ def _first(block: Array, length: int) -> Any:
 
 def _joined(parts: list[Any]) -> Array:
     """Blocks end to end; on the host unless one is traced, so that no program depends on the number of states."""
-    traced = any(isinstance(part, Tracer) for part in parts)
-    return jnp.concatenate(parts) if traced else jnp.asarray(np.concatenate(parts))
+    return jnp.concatenate(parts) if is_traced(parts) else jnp.asarray(np.concatenate(parts))

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 from .basis import DerivativeTargets, MultiIndex, monomial_columns, multi_indices
 from .estimates import Rule
 from .shape_functions import window_weights
-from .support import support_radius
+from .support import pivot_ratio, support_radius
 
 UNROLLED = 10
 """Largest basis whose factor is written out; above, compiling it costs more than LAPACK's batches."""
@@ -100,7 +100,7 @@ def _solve_unrolled(
         return solution
 
     pivots = jnp.stack([factor[i][i] for i in range(size)])
-    return jax.vmap(substitute)(targets), _pivot_ratio(pivots)
+    return jax.vmap(substitute)(targets), pivot_ratio(pivots)
 
 
 def _dot(a: list[Column], b: list[Column]) -> Any:
@@ -116,9 +116,4 @@ def _solve_batched(
     full = jnp.stack([jnp.stack([matrix[max(i, j)][min(i, j)] for j in range(size)], -1) for i in range(size)], -2)
     factor = jnp.linalg.cholesky(full)
     solution = jax.vmap(lambda one: cho_solve((one, True), targets.T))(factor)  # (points, basis, derivatives)
-    return list(jnp.moveaxis(solution, 0, -1)), _pivot_ratio(jnp.diagonal(factor, axis1=1, axis2=2).T)
-
-
-def _pivot_ratio(pivots: Float[Array, "basis points"]) -> Column:
-    ratio = jnp.min(pivots, axis=0) / jnp.max(pivots, axis=0)
-    return jnp.where(jnp.isfinite(ratio), ratio, 0.0)
+    return list(jnp.moveaxis(solution, 0, -1)), pivot_ratio(jnp.diagonal(factor, axis1=1, axis2=2).T)

@@ -8,11 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from .basis import basis_size
 from .estimates import Neighbourhood, Rule, basis_at
-from .many import LARGEST_WORK, apart, neighbourhoods
+from .many import apart, neighbourhoods, search_tree
 from .nodes import Nodes
 from .support import gathered_nodes
 
@@ -36,14 +35,13 @@ def supports(nodes: Nodes, rule: Rule, states: NDArray[np.float64], visited: Boo
     dilation = np.zeros((len(states), nodes.dim))
     for inside, where in apart(nodes, rule, states):
         near = gathered_nodes(rule.neighbours, len(inside))
-        tree = KDTree(np.asarray(inside.states) / np.asarray(inside.scale))
-        block_length = LARGEST_WORK // (near * basis_size(nodes.dim, rule.order))
-        start = 0
-        for around, block, length in neighbourhoods(tree, inside, near, states[where], block_length):
-            rows = where[start : start + length]
-            found = _supports(around, inside.scale, rule, block)
-            counts[rows], dilation[rows], condition[rows] = (np.asarray(part)[:length] for part in found)
-            start += length
+        work = near * basis_size(nodes.dim, rule.order)
+        parts = [
+            [np.asarray(one)[:length] for one in _supports(around, inside.scale, rule, block)]
+            for around, block, length in neighbourhoods(search_tree(inside), inside, near, states[where], work)
+        ]
+        for every, found in zip((counts, dilation, condition), zip(*parts, strict=True), strict=False):
+            every[where] = np.concatenate(found)
     return Support(counts, dilation, condition, visited)
 
 

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Float
 
+from ..._types import is_traced
 from .._scattered import AbstractScatteredMap, whole_number
-from .basis import DerivativeTargets, MultiIndex, basis_size, derivative_targets
+from .basis import DerivativeTargets, MultiIndex, basis_size, derivative_targets, first_derivatives
 from .estimates import (
     SINGULAR,
     Neighbourhood,
@@ -30,6 +30,7 @@ from .robust import doubted
 from .rule import weighing_rule
 from .selection import Score, choose
 from .shape_functions import LocalBasis
+from .support import gathered_nodes
 from .tuning import tune
 from .windows import AbstractWindow
 
@@ -177,7 +178,7 @@ class RKPM(AbstractScatteredMap):
 
     def gradient(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs dim"]:
         """First derivatives at one state, reproduced exactly for polynomials (eq. 46)."""
-        return jnp.moveaxis(_derivatives(self, self._state(state), self._targets(self._axes())), 0, -1)
+        return jnp.moveaxis(_derivatives(self, self._state(state), self._targets(first_derivatives(self.dim))), 0, -1)
 
     def derivative(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
         """Derivative at one state; ``orders=(3, 0)`` is the third one in the first column (eq. 46)."""
@@ -223,10 +224,7 @@ class RKPM(AbstractScatteredMap):
             If the nodes around some state cannot tell the monomials apart.
         """
         targets = self._targets(orders)
-        if any(
-            isinstance(leaf, Tracer)
-            for leaf in jax.tree.leaves((states, self.nodes.states, self.nodes.scale, self.rule))
-        ):
+        if is_traced((states, self.nodes.states, self.nodes.scale, self.rule)):
             return jax.vmap(lambda state: _derivatives(self, self._state(state), targets))(jnp.asarray(states))
         return evaluate_many(self.nodes, self.rule, self._states(states), targets)
 
@@ -257,7 +255,7 @@ def _standard_error(force_map: RKPM, state: Float[Array, " dim"], value: Derivat
 
 def _checked_basis(force_map: RKPM, state: Float[Array, " dim"]) -> tuple[Neighbourhood, LocalBasis]:
     nodes, rule = force_map.nodes, force_map.rule
-    near = nearest_nodes(nodes, rule, state)
+    near = nearest_nodes(nodes, state, gathered_nodes(rule.neighbours, len(nodes)), rule.across)
     local = basis_at(near, nodes.scale, rule, state)
     singular = ~(local.conditioning >= SINGULAR)  # also where no node lies in the region, and it is no number
     return near, local._replace(r=eqx.error_if(local.r, singular, degenerate_message(nodes, rule)))

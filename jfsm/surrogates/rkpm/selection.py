@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from ..._types import evenly_taken
 from .basis import basis_size
 from .leave_one_out import leave_one_out_errors
 from .nodes import Nodes, prepare_nodes
@@ -49,7 +50,7 @@ def choose(
             if not tried:
                 raise
             break  # the states carry no polynomials of this order
-        judged = np.unique(np.linspace(0, len(nodes) - 1, min(len(nodes), MOST_JUDGED)).astype(int))
+        judged = evenly_taken(len(nodes), MOST_JUDGED)
         errors = leave_one_out_errors(nodes, rule, counts, judged)
         tried += [(order, count) for count in counts]
         squares += list(np.sum(errors**2, axis=2))

@@ -36,11 +36,15 @@ class LocalBasis(NamedTuple):
         return self.root_weight[None, :] * (self.q @ solve_triangular(self.r, scaled.T, trans=1)).T
 
 
+def safe_root(values: Float[Array, "..."]) -> Float[Array, "..."]:
+    """Square root whose derivative is zero, not infinite, where it is zero itself."""
+    positive = values > 0.0
+    return jnp.where(positive, jnp.sqrt(jnp.where(positive, values, 1.0)), 0.0)
+
+
 def window_weights(z: Float[Array, "nodes dim"], window: AbstractWindow) -> Float[Array, " nodes"]:
     """φ of the radial distance in dilations; smooth where a node and the point coincide."""
-    squared = jnp.sum(z**2, axis=-1)
-    apart = squared > 0.0
-    return window(jnp.where(apart, jnp.sqrt(jnp.where(apart, squared, 1.0)), 0.0))
+    return window(safe_root(jnp.sum(z**2, axis=-1)))
 
 
 def moment_matrix(
@@ -85,8 +89,7 @@ def local_basis(
     weight = window_weights(z, window)
     if multiplicity is not None:
         weight = weight * multiplicity
-    occupied = weight > 0.0  # the square root has no derivative at zero
-    root = jnp.where(occupied, jnp.sqrt(jnp.where(occupied, weight, 1.0)), 0.0)
+    root = safe_root(weight)
     q, r = jnp.linalg.qr(root[:, None] * monomials(z, order))
     return LocalBasis(q, r, root, dilation, order)
 

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from .shape_functions import moment_matrix, window_weights
+from .shape_functions import moment_matrix, safe_root, window_weights
 from .windows import AbstractWindow
 
 GROWTH = (1, 2, 4)
@@ -32,10 +32,9 @@ def support_radius(distance: Float[Array, "*points near"], neighbours: int) -> F
     return BEYOND * distance[..., -1]
 
 
-def pivot_ratio(moments: Float[Array, "basis basis"]) -> Float[Array, ""]:
-    """Smallest over largest pivot of the Cholesky factor, about 1/√cond(M); 0 when it breaks down."""
-    pivots = jnp.diagonal(jnp.linalg.cholesky(moments))
-    ratio = jnp.min(pivots) / jnp.max(pivots)
+def pivot_ratio(pivots: Float[Array, "basis *points"]) -> Float[Array, "*points"]:
+    """Smallest over largest pivot of a Cholesky factor, about 1/√cond(M); 0 where it broke down."""
+    ratio = jnp.min(pivots, axis=0) / jnp.max(pivots, axis=0)
     return jnp.where(jnp.isfinite(ratio), ratio, 0.0)
 
 
@@ -46,7 +45,7 @@ def choose_dilation(
     neighbours: int,
     order: int,
     window: AbstractWindow,
-    factor: Float[Array, ""] | float = 1.0,
+    factor: Float[Array, ""],
 ) -> Float[Array, ""]:
     """Dilation a at one point, in the coordinates of `offsets`.
 
@@ -58,7 +57,7 @@ def choose_dilation(
         How many readings each node stands for.
     neighbours : int
         Number of nodes wanted inside the support.
-    factor : float
+    factor : () float array
         Share of that support which is used.
 
     Notes
@@ -66,16 +65,15 @@ def choose_dilation(
     The paper's remedy for a singular moment matrix is a larger n*. Here the support doubles at most twice. The choice
     is piecewise constant, so derivatives pass through the chosen distance only.
     """
-    squared = jnp.sum(offsets**2, axis=-1)
-    apart = squared > 0.0
-    distance = jnp.where(apart, jnp.sqrt(jnp.where(apart, squared, 1.0)), 0.0)
+    distance = safe_root(jnp.sum(offsets**2, axis=-1))
     radii = jnp.stack([support_radius(distance, growth * neighbours) for growth in GROWTH])
     dilations = factor * radii / window.radius
 
     def sound(dilation: Float[Array, ""]) -> Bool[Array, ""]:
         z = offsets / dilation
         weight = window_weights(z, window) * multiplicity
-        return pivot_ratio(moment_matrix(z, weight, order)) > SINGULAR_PIVOT_RATIO
+        factor = jnp.linalg.cholesky(moment_matrix(z, weight, order))
+        return pivot_ratio(jnp.diagonal(factor)) > SINGULAR_PIVOT_RATIO
 
     enough = jax.vmap(sound)(jax.lax.stop_gradient(dilations))
     chosen = jnp.where(jnp.any(enough), jnp.argmax(enough), len(GROWTH) - 1)

@@ -8,9 +8,11 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float
 from scipy.optimize import minimize
 
+from ..._types import evenly_taken
 from .estimates import Rule, nearest_nodes
 from .leave_one_out import error_at_node
 from .nodes import Nodes
+from .support import gathered_nodes
 
 MOST_JUDGED = 300
 BATCH = 32
@@ -22,7 +24,7 @@ STEPS = 20
 
 def tune(nodes: Nodes, rule: Rule) -> tuple[Nodes, Rule]:
     """Nodes and rule at the smallest mean square of leave-one-out errors."""
-    judged = np.unique(np.linspace(0, len(nodes) - 1, min(len(nodes), MOST_JUDGED)).astype(int))
+    judged = evenly_taken(len(nodes), MOST_JUDGED)
     start = _start(nodes, rule)
     bounds = [(-FARTHEST, FARTHEST)] * len(start)
     bounds[nodes.dim] = (min(SMALLEST_DILATION, start[nodes.dim]), 0.0)
@@ -61,7 +63,7 @@ def _log_error(values: Float[Array, " knobs"], nodes: Nodes, rule: Rule, judged:
         tuned, new_rule = _turned(values, nodes, rule)
 
         def at(state: Float[Array, " dim"]) -> Float[Array, ""]:
-            near = nearest_nodes(tuned, new_rule, state)
+            near = nearest_nodes(tuned, state, gathered_nodes(rule.neighbours, len(nodes)), rule.across)
             return jnp.sum(error_at_node(near, state, tuned.scale, new_rule.neighbours, new_rule) ** 2)
 
         return 0.5 * jnp.log(jnp.mean(jax.lax.map(at, nodes.states[judged], batch_size=min(BATCH, len(judged)))))
