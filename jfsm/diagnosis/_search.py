@@ -1,8 +1,11 @@
 """Every hypothesis fitted: those that share a program side by side, the hopeless ones only so far."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -36,17 +39,22 @@ class _Lot:
             Posterior(hypothesis(model, starts[i : i + lanes], records, begins=begins[i : i + lanes]), records, until)
             for i in range(0, len(starts), lanes)
         ]
+        self.label = f"{candidates[0].cause.label} at {'-'.join(map(str, candidates[0].at))}"
+        self.program, self.behind = posteriors[0].program, 0.0
+        self.climb = self._climb(posteriors, candidates, lanes)
+
+    def _climb(self, posteriors: Sequence[Posterior], candidates: tuple[Candidate, ...], lanes: int):
         # Where one climbs alone it is the one that begins best.
         best = 0
         if len(posteriors) > 1:
             best = int(np.argmin([np.min(p.evaluate(p.initial(), _LADDER[0])[0]) for p in posteriors]))
-        self.posterior = posteriors[best]
-        self.candidates: tuple[Candidate, ...] = candidates[best * lanes :][:lanes]
-        self.climb, self.behind = rungs(self.posterior, _LADDER), 0.0
+        self.posterior, self.candidates = posteriors[best], candidates[best * lanes :][:lanes]
+        yield from rungs(self.posterior, _LADDER)
 
-    def step(self) -> None:
+    def step(self) -> "_Lot":
         """On to the next rung."""
         self.rung = next(self.climb)
+        return self
 
     @property
     def best(self) -> float:
@@ -102,30 +110,38 @@ def search(
     """The best trial of every candidate; those far behind stay at the values of their rung."""
     values = refitted.structure.values()
     own = {p: values[p] for p in model.entries()} if refitted.evidence > given.evidence else None
-    lots = []
-    beginnings = groups(tried, own)
-    for lot in beginnings:
-        first = lot[0][0]
-        tell(f"{first.cause.label} at {'-'.join(map(str, first.at))}", 2 * len(beginnings))
-        lots.append(_Lot(lot, model, records, until))
-        lots[-1].step()
+    lots = [_Lot(beginnings, model, records, until) for beginnings in groups(tried, own)]
+    compiling = {lot.program: lot for lot in reversed(lots)}
+    for together in (compiling.values(), [lot for lot in lots if lot is not compiling[lot.program]]):
+        for lot in _side_by_side(_Lot.step, together):
+            tell(lot.label, 2 * len(lots))
     pursued = lots
     for _ in _LADDER[1:]:
         pursued = _near(pursued, max(_STILL_OPEN, len(pursued) // 2))
-        for lot in pursued:
-            lot.step()
+        list(_side_by_side(_Lot.step, pursued))
     pursued = _near(pursued, _ALWAYS_PURSUED, refitted.rung)
+
+    def finished(lot: _Lot) -> list[Trial]:
+        if lot in pursued:
+            return list(lot.trials(finish(lot.posterior, lot.rung, best=best)))
+        found = lot.trials(lot.rung)
+        return [replace(t, evidence=refitted.evidence - lot.behind, converged=False) for t in found]
+
+    # The leader goes first: beside its top the others may be left where they are.
     trials, best = [], refitted.value
-    for lot in sorted(lots, key=lambda lot: lot.behind):
-        tell("the best candidates", 2 * len(beginnings))
-        if lot not in pursued:
-            found = lot.trials(lot.rung)
-            trials += [replace(t, evidence=refitted.evidence - lot.behind, converged=False) for t in found]
-            continue
-        done = list(lot.trials(finish(lot.posterior, lot.rung, best=best)))
-        best = min([best, *(t.value for t in done)])
-        trials += done
+    ranked = sorted(lots, key=lambda lot: lot.behind)
+    for together in (ranked[:1], ranked[1:]):
+        for found in _side_by_side(finished, together):
+            tell("the best candidates", 2 * len(lots))
+            trials += found
+        best = min([best, *(t.value for t in trials)])
     return _best_of_each(trials)
+
+
+def _side_by_side(do: Callable[[_Lot], Any], lots: Iterable[_Lot]) -> Iterator[Any]:
+    """What `do` makes of each: a compiled program takes one core, and threads give it the others."""
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        yield from threads.map(do, lots)
 
 
 def _near(lots: Sequence[_Lot], least: int, leader: float = math.inf) -> list[_Lot]:

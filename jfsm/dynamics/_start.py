@@ -63,7 +63,7 @@ def _least_squares(model: Structure, head: Record, reconstruction: Reconstructio
     substeps = substeps_for(model, head.dt, typical_speed(head))
     fine = excitation(head, model.dof, substeps, reconstruction, length=padded)
     counted = jnp.asarray(np.arange(padded) < len(head), dtype=jnp.float64)
-    plant, show = lower(model, channels, grid=Grid(head.dt, substeps)), readout(channels, model.dof)
+    plant, show = lower(model, channels, grid=Grid(head.dt, substeps), rolled=True), readout(channels, model.dof)
     offset = y - np.asarray(plant.channel_offset)
     state = np.zeros(2 * model.dof)
     for i, (kind, j) in enumerate(channels):  # a measured channel is its own best first guess

@@ -127,16 +127,30 @@ def _from_rest(plant: Plant, minv, x, v, z, g, t, mode, broken):
     return jnp.where(rest, jnp.where(held > high, 1.0, jnp.where(held < low, -1.0, 0.0)), mode)
 
 
-def runge_kutta(rate, y, h, nodes):
+_SHARES = ((0.5, 1 / 6), (0.5, 1 / 3), (1.0, 1 / 3), (0.0, 1 / 6))
+"""Of each stage of the Runge-Kutta method: the share of the step to the next stage, and its weight in the sum."""
+
+
+def runge_kutta(rate, y, h, nodes, rolled: bool = False):
     """`y`, a tree of arrays, one step `h` on: the method of order four.
 
-    `rate(y, node)` is its rate at the beginning, the middle and the end of the step, which are the three `nodes`.
+    `rate(y, node)` is its rate at the beginning, the middle and the end of the step, which are the three `nodes`. The
+    stages are written out, or `rolled` into a loop.
     """
 
     def along(share, slope):
         return jax.tree.map(lambda y, r: y + share * r, y, slope)
 
     begin, middle, end = nodes
+    if rolled:
+
+        def stage(carry, inputs):
+            (at, total), (node, ahead, weight) = carry, inputs
+            slope = rate(at, node)
+            return (along(ahead * h, slope), jax.tree.map(lambda t, r: t + weight * h * r, total, slope)), None
+
+        stages = jax.tree.map(lambda *each: jnp.stack(each), begin, middle, middle, end)
+        return jax.lax.scan(stage, (y, y), (stages, *jnp.array(_SHARES).T))[0][1]
     k1 = rate(y, begin)
     k2 = rate(along(h / 2, k1), middle)
     k3 = rate(along(h / 2, k2), middle)
@@ -159,7 +173,7 @@ def _in_mode(plant: Plant, minv, x, v, z, mode, load: Load, start, share):
         (x, v, z), (g, base, t) = state, node
         return v, acceleration(plant, minv, x, v, z, mode, g, t)[0], hidden_rate(plant, x, v, z, t, base)
 
-    x, v, z = runge_kutta(rate, (x, v, z), share * load.step, nodes)
+    x, v, z = runge_kutta(rate, (x, v, z), share * load.step, nodes, plant.rolled)
     return x, v, settle(plant, x, z)
 
 

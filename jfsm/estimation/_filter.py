@@ -177,16 +177,20 @@ def _rest(plant, minv, covariance, mode):
 def _update(plant, minv, show, motion: Motion, covariance, load: Load, y, use, variances, nothing):
     """State after the readings of one sample, and their innovations; `load` is that of the sample's first step, and
     speeds of links up to `nothing` are none."""
-    mean = jnp.concatenate([motion.x, motion.v, motion.z])
+    mean = before = jnp.concatenate([motion.x, motion.v, motion.z])
+    late = [
+        (channel, *_late(plant, minv, show, tau, mean, motion.mode, load))
+        for tau, channel in zip(plant.channel_delay, plant.late_channel, strict=True)
+    ]
     errors, spreads = [], []
     for c in range(y.shape[0]):
         gain = 1.0 + plant.channel_gain[c]
-        if plant.channel_delay.size:
-            predicted, row = _late(plant, minv, show, c, mean, motion.mode, load)
-        else:
-            predicted, row = _predict(
-                plant, minv, show, c, mean, covariance, motion.mode, load, y[c], variances[c], gain, nothing
-            )
+        predicted, row = _predict(
+            plant, minv, show, c, mean, covariance, motion.mode, load, y[c], variances[c], gain, nothing
+        )
+        for channel, then, rows in late:  # what other channels have told of the motion by now moves it along its slope
+            predicted = jnp.where(channel == c, then[c] + jnp.sum(rows[c] * (mean - before)), predicted)
+            row = jnp.where(channel == c, rows[c], row)
         error = y[c] - gain * predicted - plant.channel_offset[c]
         row = gain * row
         cross = jnp.sum(covariance * row[None, :], 1)
@@ -214,21 +218,19 @@ def _predict(plant, minv, show, c, mean, covariance, mode, load: Load, y, varian
     return jnp.sum(select * (a + load.base[0])), jnp.sum(select[:, None] * by_state, 0)
 
 
-def _late(plant, minv, show, c, mean, mode, load: Load):
-    """As `_predict`, of a channel that shows the motion of a moment ago: one step back in time."""
+def _late(plant, minv, show, tau, mean, mode, load: Load):
+    """Readings (channels,) of the motion of a moment ago, one step back in time, and their derivative by the state."""
     dof = plant.dof
 
-    def reading(mean):
-        tau = plant.channel_delay[c]
+    def readings(mean):
         now = Motion(mean[:dof], mean[dof : 2 * dof], mean[2 * dof :], mode)
         back = _backward(load, tau)
         then = advance(plant, minv, now, back)
         a = acceleration(plant, minv, *then, back.force[2], back.time - tau)[0]
         shown = {"displacement": then.x, "velocity": then.v, "acceleration": a + back.base[2]}
-        return jnp.sum(show.select[c] * shown[show.kinds[c]])
+        return jnp.stack([jnp.sum(row * shown[kind]) for row, kind in zip(show.select, show.kinds, strict=True)])
 
-    value, rows = jax.vmap(lambda e: jax.jvp(reading, (mean,), (e,)), out_axes=(None, 0))(jnp.eye(mean.size))
-    return value, rows
+    return jax.vmap(lambda e: jax.jvp(readings, (mean,), (e,)), out_axes=(None, 1))(jnp.eye(mean.size))
 
 
 def _backward(load: Load, tau) -> Load:

@@ -5,6 +5,7 @@ matrix is the plant. That matrix is data: another place, sign or law leaves the 
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import jax.numpy as jnp
@@ -46,7 +47,7 @@ def with_vector(plant: Plant, vector: Float[Array, " size"]) -> Plant:
         size = int(np.prod(old.parameters.shape))
         row = jnp.reshape(vector[place : place + size], old.parameters.shape)
         parts[name], place = type(old)(old.kind, row, old.direction, old.laws), place + size
-    return Plant(**parts, maps=plant.maps, reach=plant.reach)
+    return replace(plant, **parts)
 
 
 def plant_rows(

@@ -1,7 +1,7 @@
 """A structure's posterior on one or several records: likelihood times what was known beforehand."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 import jax
@@ -20,7 +20,7 @@ LANES = 4
 """Starts that run side by side where nothing sticks; fewer are repeated, so that one program serves all."""
 _KNOWN_START, _HIDDEN_START = 1e-6, 0.3
 """Doubt about the initial state, and about hidden states there, as shares of the motion's size."""
-_WIDTHS = (12, 16, 20, 24, 32, 48, 64, 96, 128)
+_WIDTHS = (16, 20, 24, 32, 48, 64, 96, 128)
 
 
 def lanes_of(structure: Structure) -> int:
@@ -30,8 +30,11 @@ def lanes_of(structure: Structure) -> int:
     sensor is late, which has no second start.
     """
     sticks = any(isinstance(term, AbstractFriction) for term in structure.terms)
-    late = any(isinstance(sensor, ForceDelay | ChannelDelay) for sensor in structure.sensors)
-    return 1 if sticks or late else LANES
+    return 1 if sticks or _is_late(structure) else LANES
+
+
+def _is_late(structure: Structure) -> bool:
+    return any(isinstance(sensor, ForceDelay | ChannelDelay) for sensor in structure.sensors)
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,13 @@ class Posterior:
     @property
     def lanes(self) -> int:
         return len(self.hypothesis.structures)
+
+    @property
+    def program(self) -> Hashable:
+        """Posteriors for which this is equal share their compiled programs."""
+        used = [(plant, maps, n.fine) for n, (plant, maps, _) in zip(self.records, self._parts, strict=True)]
+        leaves, tree = jax.tree.flatten(used)
+        return tree, tuple((leaf.shape, leaf.dtype) for leaf in leaves)
 
     def initial(self) -> np.ndarray:
         """Starting values (lanes, unknowns)."""
@@ -173,7 +183,7 @@ class Posterior:
         mine = np.array([k for k, u in enumerate(self.hypothesis.unknowns[0]) if u.record in (None, index)])
         width = next(w for w in _WIDTHS if w >= len(mine))
         grid = Grid(float(nuisances.record.dt), nuisances.fine.substeps)
-        slots = {"smooth_slots": _slot_bucket(structures[0]), "grid": grid}
+        slots = {"smooth_slots": _slot_bucket(structures[0]), "grid": grid, "rolled": True}
         plants = [lower(s, nuisances.channels, **slots) for s in structures]
         packed = {}
         for lane in set(self._pick):
@@ -232,7 +242,7 @@ def _slot_bucket(structure: Structure) -> int:
     """Smooth slots of the program: one for a candidate beside a linear model, then powers of two."""
     plant = lower(structure)
     count = len(plant.smooth)
-    if count == 0 and (len(plant.friction) or len(plant.memory) or len(plant.delayed)):
+    if count == 0 and (len(plant.friction) or len(plant.memory) or len(plant.delayed) or _is_late(structure)):
         return 0  # in a program of its own anyway
     return 1 if count <= 1 else 2 ** math.ceil(math.log2(count))
 
