@@ -302,6 +302,35 @@ def demo(
     typer.echo(f"The page is {report.resolve()}.")
 
 
+@command
+def paper(
+    section: Annotated[
+        list[str] | None, _option("Repeat this section alone: 2, 3, 4 or noise; repeat for more.", "SECTION")
+    ] = None,
+    figures: Annotated[Path | None, _option("Draw the figures into this folder, as PNG.", "DIR")] = None,
+    json: Annotated[Path | None, _option("Write every number here, as JSON.")] = None,
+) -> None:
+    """Repeat the study of the paper this grew from: its numbers beside ours and the truth."""
+    from .paper import study
+
+    _check_outputs({"--json": json}, [])
+    if figures is not None:
+        figures.mkdir(parents=True, exist_ok=True)  # before any work: what stands in its way is refused
+    with _progress() as tell:
+        found = study(section, tell)
+        if figures is not None:
+            found.figures(figures, tell)
+    if json is not None:
+        found.to_json(json)
+    for outcome in found.sections.values():
+        for table in outcome.tables():
+            _table(table.title, table.headings, table.rows)
+            for note in table.notes:
+                typer.echo(f"  {note}.")
+            typer.echo()
+    typer.echo("! marks what the paper prints otherwise than the truth is; errors are relative.")
+
+
 @contextmanager
 def _progress() -> Iterator[Callable[[str, int, int], None]]:
     """A function that moves a bar on standard error: what is done, steps done, steps in all. Silent off a terminal."""

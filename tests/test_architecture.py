@@ -25,6 +25,7 @@ ROOMS = (
     "diagnosis",
     "systems",
     "demo",
+    "paper",
     "cli",
 )
 

@@ -93,7 +93,7 @@ def answer(monkeypatch, verdict: str = "consistent") -> dict[str, Any]:
 def test_help_names_every_command():
     result = run("--help")
     assert result.exit_code == 0
-    for name in ("inspect", "simulate", "fit", "diagnose", "causes", "demo"):
+    for name in ("inspect", "simulate", "fit", "diagnose", "causes", "demo", "paper"):
         assert name in result.stdout
 
 

@@ -78,14 +78,14 @@ def derivatives_at(
     return jnp.tensordot(local.shape_functions(targets), near.force, axes=1)
 
 
-def standard_error_at(local: LocalBasis, near: Neighbourhood, value: DerivativeTargets) -> Float[Array, "*outputs"]:
-    """Standard error of the force; `RKPM.std` states the formula."""
+def standard_error_at(local: LocalBasis, near: Neighbourhood, targets: DerivativeTargets) -> Float[Array, "*outputs"]:
+    """Standard error of the first of `targets`; `RKPM.std` states the formula."""
     force = near.force.reshape(near.force.shape[0], -1)
     weighted = local.root_weight[:, None] * force
     residual = weighted - local.q @ (local.q.T @ weighted)  # √(φc)·e
     freedom = jnp.sum(local.root_weight**2 / near.multiplicity * (1.0 - local.leverage))
     variance = jnp.sum(residual**2, axis=0) / freedom
-    spread = jnp.sum(local.shape_functions(value)[0] ** 2 / near.multiplicity)
+    spread = jnp.sum(local.shape_functions(targets)[0] ** 2 / near.multiplicity)
     return jnp.sqrt(variance * spread).reshape(near.force.shape[1:])
 
 

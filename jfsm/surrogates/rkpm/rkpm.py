@@ -184,8 +184,10 @@ class RKPM(AbstractScatteredMap):
         """Derivative at one state; ``orders=(3, 0)`` is the third one in the first column (eq. 46)."""
         return _derivatives(self, self._state(state), self._targets([orders]))[0]
 
-    def std(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
+    def std(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...] | None = None) -> Float[Array, "*outputs"]:
         r"""Standard error of the force at one state from the scatter of the neighbours about the local fit.
+
+        With `orders`, as for `derivative`, that of the derivative.
 
         Notes
         -----
@@ -195,8 +197,9 @@ class RKPM(AbstractScatteredMap):
         .. math:: \hat\sigma^2 = \frac{\sum_i \phi_i c_i e_i^2}{\sum_i \phi_i (1 - l_i)}, \qquad
             \mathrm{std}^2 = \hat\sigma^2 \sum_i \psi_i^2 / c_i,
 
-        which is unbiased where the truth is a polynomial of the map's order. Elsewhere part of the approximation error
-        counts as noise. Noise in the states themselves is not known here.
+        with the shape functions θ of eq. 46 for ψ where a derivative is asked for. It is unbiased where the truth is a
+        polynomial of the map's order. Elsewhere part of the approximation error counts as noise. Noise in the states
+        themselves is not known here.
 
         Raises
         ------
@@ -209,7 +212,7 @@ class RKPM(AbstractScatteredMap):
                 f"`std` needs more neighbours than the {size} monomials; the map was fitted with "
                 f"{self.rule.neighbours}. Enlarge `neighbours`."
             )
-        return _standard_error(self, self._state(state), self._targets([(0,) * self.dim]))
+        return _standard_error(self, self._state(state), self._targets([orders or (0,) * self.dim]))
 
     def evaluate_derivatives(
         self, states: Float[ArrayLike, "q dim"], orders: Sequence[MultiIndex]
@@ -248,9 +251,11 @@ def _derivatives(
 
 
 @eqx.filter_jit
-def _standard_error(force_map: RKPM, state: Float[Array, " dim"], value: DerivativeTargets) -> Float[Array, "*outputs"]:
+def _standard_error(
+    force_map: RKPM, state: Float[Array, " dim"], targets: DerivativeTargets
+) -> Float[Array, "*outputs"]:
     near, local = _checked_basis(force_map, state)
-    return standard_error_at(local, near, value)
+    return standard_error_at(local, near, targets)
 
 
 def _checked_basis(force_map: RKPM, state: Float[Array, " dim"]) -> tuple[Neighbourhood, LocalBasis]:
