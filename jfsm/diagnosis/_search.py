@@ -1,14 +1,12 @@
 """Every hypothesis fitted: those that share a program side by side, the hopeless ones only so far."""
 
 import math
-import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
+from .._threads import side_by_side
 from ..identification import LANES, Maximum, Nuisances, Posterior, approach, finish, lanes_of, rungs
 from ..structures import Structure
 from ._candidates import Candidate, hypothesis
@@ -18,9 +16,9 @@ _LADDER = (0.3, 0.03, 0.01)
 """Rungs for a candidate: the refit has been at the top already."""
 _FAR_BEHIND = 200.0
 """Nats behind the leader, one per cent of unmodelled force forgiven, from which a candidate is not pursued,"""
-_ALWAYS_PURSUED = 3
+_ALWAYS_PURSUED = 4
 """unless it is among the best of them."""
-_STILL_OPEN = 6
+_STILL_OPEN = 10
 """Lots that go on after an early rung, at least; half of them in any case."""
 
 
@@ -90,12 +88,16 @@ def groups(tried: Sequence[Candidate], own: Mapping[str, float] | None) -> list[
     beside it. A gain lies on a ridge with the own values, and only a climb from those as given ends at its own end.
     """
     by_law: dict[tuple, list[Beginning]] = {}
+    lots = []
     for candidate in tried:
         begins = [None] if candidate.cause.is_sensor or own is None else [None, own]
         alone = lanes_of(candidate.starts[0]) == 1  # all starts of one candidate then, of which one climbs
         lot = by_law.setdefault((candidate.cause.effect, candidate if alone else None), [])
         lot += [(candidate, s, begin) for begin in begins for s in candidate.starts]
-    return [lot[i : i + LANES] for lot in by_law.values() for i in range(0, len(lot), LANES)]
+    for (_, alone), lot in by_law.items():
+        width = len(lot) if alone else LANES
+        lots += [lot[i : i + width] for i in range(0, len(lot), width)]
+    return lots
 
 
 def search(
@@ -113,12 +115,12 @@ def search(
     lots = [_Lot(beginnings, model, records, until) for beginnings in groups(tried, own)]
     compiling = {lot.program: lot for lot in reversed(lots)}
     for together in (compiling.values(), [lot for lot in lots if lot is not compiling[lot.program]]):
-        for lot in _side_by_side(_Lot.step, together):
+        for lot in side_by_side(_Lot.step, together):
             tell(lot.label, 2 * len(lots))
     pursued = lots
     for _ in _LADDER[1:]:
         pursued = _near(pursued, max(_STILL_OPEN, len(pursued) // 2))
-        list(_side_by_side(_Lot.step, pursued))
+        list(side_by_side(_Lot.step, pursued))
     pursued = _near(pursued, _ALWAYS_PURSUED, refitted.rung)
 
     def finished(lot: _Lot) -> list[Trial]:
@@ -131,17 +133,11 @@ def search(
     trials, best = [], refitted.value
     ranked = sorted(lots, key=lambda lot: lot.behind)
     for together in (ranked[:1], ranked[1:]):
-        for found in _side_by_side(finished, together):
+        for found in side_by_side(finished, together):
             tell("the best candidates", 2 * len(lots))
             trials += found
         best = min([best, *(t.value for t in trials)])
     return _best_of_each(trials)
-
-
-def _side_by_side(do: Callable[[_Lot], Any], lots: Iterable[_Lot]) -> Iterator[Any]:
-    """What `do` makes of each: a compiled program takes one core, and threads give it the others."""
-    with ThreadPoolExecutor(os.cpu_count()) as threads:
-        yield from threads.map(do, lots)
 
 
 def _near(lots: Sequence[_Lot], least: int, leader: float = math.inf) -> list[_Lot]:

@@ -1,8 +1,6 @@
 """Many free runs in one call: other numbers, other starts, the same laws."""
 
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from .._threads import side_by_side
 from .._types import as_array, require_x64
 from ..records import Record
 from ..structures import MapTerm, Structure
@@ -124,9 +123,7 @@ def simulate_many(
         for out, values in zip((x, v, a), _runs(plant, fine, *start), strict=True):
             out[index] = np.asarray(values)[: index.size, : len(record)]
 
-    # The program itself runs on one core: threads give it the others.
-    with ThreadPoolExecutor(os.cpu_count()) as threads:
-        list(threads.map(together, range(0, runs, _LANES[-1])))
+    list(side_by_side(together, range(0, runs, _LANES[-1])))
     escaped = escapes(motion_bound(plants, fine, record, x0, x), x, v)
     for k in np.flatnonzero(escaped < len(record)):
         for out in (x, v, a):

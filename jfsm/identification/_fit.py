@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .._result import Result
+from .._threads import side_by_side
 from .._types import require_x64
 from ..dynamics import Reconstruction
 from ..records import Record
@@ -21,6 +22,8 @@ _TIED = 0.98
 _SURE = 0.05
 """unless each is known to this relative standard error all the same."""
 _STEPS = 60
+_BEGINNINGS = 4
+"""Starts of a law from which a fit begins, where they climb side by side."""
 _PURSUED = 2
 """Beginnings that are followed to the top."""
 _REFINEMENTS = 3
@@ -100,7 +103,8 @@ def fit(
     free = free_paths(model, prepared, fixed)
     held = {path: value for path, value in model.values().items() if path not in free}
     found = starts(model, prepared[0])
-    found += natural_starts(model, prepared[0], lanes_of(model) - 1 - len(found))
+    if lanes_of(model) > 1:
+        found += natural_starts(model, prepared[0], _BEGINNINGS - 1 - len(found))
     beginnings = [model, *(start.with_values(held) for start in found)]
     prepared = [n.resolving(beginnings) for n in prepared]
     posterior, best, lane = _best([_beginning(m, free, prepared, bounds or {}) for m in beginnings], prepared)
@@ -156,9 +160,10 @@ def _best(beginnings: Sequence[tuple], prepared: Sequence[Nuisances]) -> tuple[P
     lanes = lanes_of(beginnings[0][0])
     lots = [beginnings[i : i + lanes] for i in range(0, len(beginnings), lanes)]
     posteriors = [Posterior(Hypothesis(*zip(*lot, strict=True)), prepared) for lot in lots]
-    rungs = [approach(posterior) for posterior in posteriors]
+    posteriors[0].evaluate(posteriors[0].initial())  # compiled once, before all ask for it
+    rungs = list(side_by_side(approach, posteriors))
     order = np.argsort([float(np.min(rung.value)) for rung in rungs])[:_PURSUED]
-    tops = [(posteriors[k], finish(posteriors[k], rungs[k], _STEPS)) for k in order]
+    tops = list(side_by_side(lambda k: (posteriors[k], finish(posteriors[k], rungs[k], _STEPS)), order))
     if len(beginnings) == 1:  # the top rungs lead astray what is nearly right
         given = replace(rungs[0], theta=posteriors[0].initial())
         tops.append((posteriors[0], finish(posteriors[0], given, _STEPS)))

@@ -16,7 +16,7 @@ from ._likelihood import Lanes, derivatives, predictions
 from ._nuisances import Nuisances
 from ._unknowns import Unknown
 
-LANES = 4
+LANES = 2
 """Starts that run side by side where nothing sticks; fewer are repeated, so that one program serves all."""
 _KNOWN_START, _HIDDEN_START = 1e-6, 0.3
 """Doubt about the initial state, and about hidden states there, as shares of the motion's size."""

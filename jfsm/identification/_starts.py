@@ -21,7 +21,7 @@ from ..structures import AbstractTerm, LinearDamping, LinearStiffness, MapTerm, 
 from ._nuisances import Nuisances
 
 _SAMPLES = 8192
-_AT_ONCE = 256
+_AT_ONCE = 16
 """Shapes evaluated in one call; a short list is filled up, so that one program serves all."""
 _ALIKE = 0.98
 """Correlation of two forces from which they are one start."""
@@ -194,7 +194,7 @@ def _stays(law: AbstractTerm) -> dict[str, float]:
 def _lots(kind: type[AbstractTerm], rows: list[dict[str, float]]):
     for begin in range(0, len(rows), _AT_ONCE):
         chunk = rows[begin : begin + _AT_ONCE]
-        filled = chunk + [chunk[-1]] * (-len(chunk) % (16 if len(chunk) <= 16 else _AT_ONCE))
+        filled = chunk + [chunk[-1]] * (_AT_ONCE - len(chunk))
         yield chunk, np.array([[row[p.name] for p in kind.parameters] for row in filled])
 
 
@@ -215,7 +215,7 @@ def _along_each(plant: Plant, name: str, numbers, x, v, time):
     def one(row):
         return force_along(eqx.tree_at(lambda p: getattr(p, name).parameters, plant, row), x, v, time)
 
-    return jax.lax.map(one, numbers, batch_size=16)
+    return jax.vmap(one)(numbers)
 
 
 def _regressed(columns: np.ndarray, wanted: np.ndarray, basis: np.ndarray):
