@@ -253,21 +253,16 @@ def diagnose(
 
 @command
 def causes() -> None:
-    """List the catalogue of causes, and which of them a diagnosis looks for unless told otherwise."""
-    from .diagnosis import SOUGHT
+    """List the catalogue of causes."""
     from .structures import causes
 
     for family in dict.fromkeys(cause.family for cause in causes().values()):
         rows = [
-            (
-                cause.id,
-                "always" if cause.is_value else "yes" if cause.id in SOUGHT else "if asked",
-                f"{', '.join(p.name for p in cause.effect.parameters)}: {cause.sentence}",
-            )
+            (cause.id, f"{', '.join(p.name for p in cause.effect.parameters)}: {cause.sentence}")
             for cause in causes().values()
             if cause.family == family
         ]
-        _table(family.capitalize(), ("cause", "looked for", "parameters and what it is"), rows)
+        _table(family.capitalize(), ("cause", "parameters and what it is"), rows)
 
 
 @command

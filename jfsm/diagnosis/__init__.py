@@ -1,6 +1,5 @@
 """What is wrong: candidates, evidence, gate, gain, verdict."""
 
-from ._candidates import SOUGHT as SOUGHT
 from ._diagnose import diagnose as diagnose
 from ._diagnosis import Diagnosis as Diagnosis
 from ._diagnosis import Estimate as Estimate

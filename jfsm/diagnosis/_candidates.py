@@ -36,11 +36,6 @@ _SHAPES = 2
 """Starts of a law."""
 _FOLLOWED = 8
 """Laws that are fitted, the most promising ones."""
-SOUGHT = (
-    "cubic_hardening", "cubic_softening", "quadratic_stiffness", "coulomb", "quadratic_damping", "force_gain",
-    "accel_gain",
-)  # fmt: skip
-"""Causes that are looked for unless others are asked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +43,7 @@ class Candidate:
     """A cause at a place; `starts` are the structures that a fit begins from.
 
     `share` is how much of the missing force the best of them explains by regression; None for sensors, which lack none.
+    A law that no shape of which explains any has no starts.
     """
 
     cause: Cause
@@ -65,10 +61,8 @@ def chosen_causes(selection: Sequence[str | Cause] | None) -> dict[str, Cause]:
         If an id is not in the catalogue.
     """
     known = dict(causes())
-    if selection is None:
-        return {name: known[name] for name in SOUGHT}
     found = {}
-    for item in selection:
+    for item in known if selection is None else selection:
         if isinstance(item, Cause):
             found[item.id] = item
         elif item in known:
@@ -96,8 +90,7 @@ def candidates(
             spots = dict.fromkeys(c for n in records for c in n.record.channels if c[0] in kinds)
             found += [Candidate(cause, at, _natural_starts(model, cause, at, records[0])) for at in spots]
         else:
-            placed = [laws.candidate(cause, (i, j)) for i, j in (model.links if places is None else places)]
-            found += [candidate for candidate in placed if candidate.starts]
+            found += [laws.candidate(cause, (i, j)) for i, j in (model.links if places is None else places)]
     return found
 
 
@@ -105,7 +98,7 @@ def promising(tried: Sequence[Candidate]) -> tuple[list[Candidate], list[Candida
     """Candidates that are worth a fit, and those that are not: laws that explain least of the missing force."""
     ranked = sorted((c.share for c in tried if c.share is not None), reverse=True)
     least = ranked[_FOLLOWED - 1] if len(ranked) > _FOLLOWED else -math.inf
-    chosen = [c.share is None or c.share >= least for c in tried]
+    chosen = [bool(c.starts) and (c.share is None or c.share >= least) for c in tried]
     return list(compress(tried, chosen)), list(compress(tried, [not c for c in chosen]))
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..structures import AbstractTerm
+from ..structures import AbstractTerm, LinearStiffness
 from ._trial import Trial
 
 GATE = 0.5
@@ -131,6 +131,11 @@ def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
     over_refit, over_given = explained(t, refitted), explained(t, given)
     if not math.isfinite(t.evidence) or over_refit == -math.inf:
         return "its motion runs away"
+    if t.cause is not None and not t.cause.is_sensor:
+        law = t.structure.terms[-1]
+        springs = [s for s in t.structure.terms if isinstance(s, LinearStiffness) and set(s.at) == set(law.at)]
+        if other := law.otherwise(sum(float(s.k) for s in springs)):
+            return other
     # A gain error and own values that are all off by the same share predict the same readings: only what is believed
     # beforehand weighs them, so such a candidate need not beat the refit by a margin, nor leave less.
     same = t.cause is not None and t.cause.is_sensor and adequate(t) and adequate(refitted)

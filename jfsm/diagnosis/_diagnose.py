@@ -48,8 +48,8 @@ def diagnose(
     holdout : float, Record, sequence of Records, or None
         A share is the last part in time; records are never fitted; None decides on the whole record and gives no gain.
     causes : sequence of ids or causes, optional
-        What to look for; `SOUGHT` by default, the causes whose naming has been examined. Wrong own values always. Of
-        many laws, those are fitted that explain most of the force that the model lacks.
+        What to look for; the whole catalogue by default. Wrong own values always. Of many laws, those are fitted that
+        explain most of the force that the model lacks.
     max_causes : int
         Effects that may act at once, at most; a single one is looked for at present.
     key : jax.random.key, optional

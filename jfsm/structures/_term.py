@@ -150,6 +150,10 @@ class AbstractTerm(eqx.Module):
         """Instants [s] at which the law jumps."""
         return ()
 
+    def otherwise(self, stiffness: float) -> str:
+        """Why these numbers, beside so much linear stiffness of the link, make it another law; empty if they do not."""
+        return ""
+
     @classmethod
     def shapes(cls, scale: Scale) -> list[Numbers]:
         """Sets of numbers to begin a search from, each with a force of the elastic one's size.

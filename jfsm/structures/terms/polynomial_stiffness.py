@@ -70,6 +70,9 @@ class DoubleWell(AbstractTerm):
     def force(self, d, w, z, t):
         return (self.k3 * d * d - self.k_neg) * d
 
+    def otherwise(self, stiffness):
+        return "" if self.k_neg > stiffness else "takes less stiffness than there is: one well, not two"
+
     @classmethod
     def shapes(cls, scale):
         k, x = scale.force / scale.length, scale.length
