@@ -300,7 +300,7 @@ def demo(
 @command
 def paper(
     section: Annotated[
-        list[str] | None, _option("Repeat this section alone: 2, 3, 4 or noise; repeat for more.", "SECTION")
+        list[str] | None, _option("Repeat this section alone: 2, 3, 4, 5 or noise; repeat for more.", "SECTION")
     ] = None,
     figures: Annotated[Path | None, _option("Draw the figures into this folder, as PNG.", "DIR")] = None,
     json: Annotated[Path | None, _option("Write every number here, as JSON.")] = None,

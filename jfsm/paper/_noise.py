@@ -14,6 +14,7 @@ from ..surrogates import RKPM, AbstractForceStateMap, Kriging, Polynomial
 from ..surrogates.rkpm.basis import multi_indices
 from ..systems import ALL, GROUND
 from ._cases import COEFFICIENTS
+from ._kriging import krige
 from ._rows import Coefficient, NoiseRow, Outcome, Tell
 from ._simulated import MOTION, Run, oscillator
 
@@ -25,6 +26,7 @@ FITS: dict[str, Fit] = {
     "RKPM 3, n* = 80": lambda states, force: RKPM.fit(states, force, order=3, neighbours=80),
     "RKPM 3, n* = 320": lambda states, force: RKPM.fit(states, force, order=3, neighbours=320),
     "RKPM, leave-one-out": lambda states, force: RKPM.select(states, force).force_map,
+    "kriging, cubic trend": krige,
     "cubic polynomial": lambda states, force: Polynomial.fit(states, force, order=3),
 }
 """Maps that are compared, by name."""

@@ -10,6 +10,7 @@ from ..reporting import write_text_atomically
 from ._cases import section_4
 from ._examples import section_2, section_3
 from ._figures import save_drawing
+from ._kriging import section_5
 from ._noise import section_noise
 from ._rows import Outcome, Tell
 
@@ -17,6 +18,7 @@ SECTIONS: dict[str, Callable[[Tell], Outcome]] = {
     "2": section_2,
     "3": section_3,
     "4": section_4,
+    "5": section_5,
     "noise": section_noise,
 }
 """What can be asked for, in the order of the paper."""

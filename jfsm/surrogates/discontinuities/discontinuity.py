@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -10,8 +11,9 @@ from jaxtyping import Array, Float
 from numpy.typing import NDArray
 
 from .line import Kind, Line, all_but
-from .places import last_below, profile, refined_kink
+from .places import refined_kink
 from .regression import Regression, variance
+from .sides import sides
 
 QUANTILE_95 = 1.959964
 BLURS = 2.0 ** np.arange(-4, 1)
@@ -29,7 +31,7 @@ class Discontinuity(eqx.Module):
     offset: Float[Array, ""]
     low: Float[Array, ""]
     high: Float[Array, ""]
-    """95 % interval of `offset`."""
+    """95 % interval of `offset`; of a jump it ends at readings, and is the gap between two of them without noise."""
     size: Float[Array, ""]
     """Jump of the force, or change of its slope per unit of ``normal · state``, towards higher values."""
     size_error: Float[Array, ""]
@@ -51,17 +53,17 @@ def described(regression: Regression, lines: Sequence[Line], k: int) -> Disconti
     columns = regression.beside(others, line, width)
     residual, coefficients, freed = regression.residual(columns, size)
     error = math.sqrt(variance(residual, freed, lead) * regression.n / looks)
-    narrow = BLURS[1] * regression.resolution if line.kind == "jump" else 0.0
-    # a jump that is sharp to the readings is moved as if blurred a little: a step has no derivative by its place
-    moving = np.concatenate([columns, line.shift(regression.s, width or narrow)], axis=1)
-    moved, shares, freed = regression.residual(moving, size)
-    unexplained = moved if line.kind == "kink" or width else residual
-    half = math.sqrt(variance(unexplained, freed, -1) * regression.n / looks) / abs(float(shares[lead]))
-    low, high = line.offset - QUANTILE_95 * half, line.offset + QUANTILE_95 * half
-    if line.kind == "jump" and not width:
-        places, squares = profile(regression, line, others)
-        likely = places[0.5 * looks * np.log(squares / squares.min()) < 0.5 * QUANTILE_95**2]
-        low, high = min(low, last_below(regression, line, float(likely[0]))), max(high, float(likely[-1]))
+    if line.kind == "jump":
+        step = coefficients[lead] * columns[:, lead]
+        place, low, high = sides(regression, line, residual + step, float(coefficients[lead]))
+        line = replace(line, offset=place)
+    else:
+        moving = np.concatenate([columns, line.shift(regression.s)], axis=1)
+        moved, shares, freed = regression.residual(moving, size)
+        deviation = math.sqrt(variance(moved, freed, -1) * regression.n / looks)
+        # and the step that the search still had to go, where sums of squares were at their rounding
+        half = (QUANTILE_95 * deviation + abs(float(shares[-1]))) / abs(float(shares[lead]))
+        low, high = line.offset - half, line.offset + half
     middle, reach = regression.middle[line.direction], regression.half[line.direction]
     per_unit = regression.unit / (1.0 if line.kind == "jump" else reach)
     numbers = (

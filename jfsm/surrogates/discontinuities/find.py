@@ -49,10 +49,11 @@ def find_discontinuities(
     .. math:: f = \\sum_j \\beta_j T_j(x) + \\sum_k (a_k + b_k (s_k - o_k)) U(s_k - o_k)
 
     is fitted, T Chebyshev polynomials of an order chosen by BIC, s = normal · state, a = 0 for a kink. Lines enter one
-    at a time at the best of many places. A kink is then refined by linearisation [1]_, a jump between neighbouring
-    readings. A line is kept if it is far more probable than (i) none and (ii) a tanh or softplus of finite width at its
-    best place, each with its own best polynomial order. Residuals that are no noise, by their nearest neighbours, count
-    as at most twenty independent looks.
+    at a time at the best of many places. A kink is then refined by linearisation [1]_, a jump to the best of all gaps
+    between neighbouring readings; its interval holds every place that the likelihood does not refuse, with readings
+    that noise in the states has put on the wrong side. A line is kept if it is far more probable than (i) none and
+    (ii) a tanh or softplus of finite width at its best place, each with its own best polynomial order. Residuals that
+    are no noise, by their nearest neighbours, count as at most twenty independent looks.
 
     References
     ----------

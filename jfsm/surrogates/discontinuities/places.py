@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .line import Line, all_but, step_and_hinge
+from .line import Line, all_but
 from .regression import Regression
 
 CANDIDATES = 49
@@ -14,8 +14,6 @@ CANDIDATES = 49
 INNER = 0.1
 """Share of the readings and of the range at either end where no line is looked for: little lies beyond it, and noise
 in the states bends every map there."""
-MOST_GAPS = 200
-"""Places of a jump that are compared around the best candidate."""
 SWEEPS = 4
 
 
@@ -60,37 +58,32 @@ def refined_kink(regression: Regression, line: Line, others: NDArray, width: flo
 
 
 def refined_jump(regression: Regression, line: Line, others: NDArray) -> Line:
-    """The step lies between two neighbouring readings: at the middle of the best gap."""
-    places, squares = profile(regression, line, others)
-    place = float(places[np.argmin(squares)])
-    return replace(line, offset=(last_below(regression, line, place) + place) / 2.0)
-
-
-def profile(regression: Regression, line: Line, others: NDArray) -> tuple[NDArray, NDArray]:
-    """Places of a step with a change of slope, and the sum of squares at each."""
-    places = gaps(regression, line)
+    """The step lies between two neighbouring readings: at the middle of the gap with the least sum of squares."""
     size = regression.best_size(regression.beside(others, line))
     q = np.linalg.qr(np.concatenate([regression.q[:, :size], others], axis=1))[0]
     rest = regression.force - q @ (q.T @ regression.force)
-    u = regression.s[line.direction][:, None] - places[None, :]
-    step, hinge = (c - q @ (q.T @ c) for c in step_and_hinge(u))
-    aa, ab, bb = (np.sum(p * q, axis=0) for p, q in ((step, step), (step, hinge), (hinge, hinge)))
-    a, b = rest @ step, rest @ hinge
-    slope = np.where(bb > 0.0, b / np.where(bb > 0.0, bb, 1.0), 0.0)
-    own = aa - np.where(bb > 0.0, ab**2 / np.where(bb > 0.0, bb, 1.0), 0.0)
-    jump = np.where(own > 0.0, (a - slope * ab) ** 2 / np.where(own > 0.0, own, 1.0), 0.0)
-    return places, np.maximum(rest @ rest - slope * b - jump, regression.rounding)
+    # sums over all readings from each upwards, for step and hinge: no column for every place
+    s = regression.s[line.direction] - line.offset
+    order = np.argsort(-s)
+    s, rows = s[order], np.concatenate([q, rest[:, None]], axis=1)[order]
+    flat, rising = np.cumsum(rows, axis=0), np.cumsum(s[:, None] * rows, axis=0)
+    count, first, second = np.arange(1.0, regression.n + 1.0), np.cumsum(s), np.cumsum(s**2)
+    near = np.flatnonzero((s[1:] < s[:-1]) & (np.abs(s[:-1]) < max(2.0 / CANDIDATES, regression.resolution)))
+    if not near.size:
+        return line
+    u, step = s[near], flat[near]
+    hinge = rising[near] - u[:, None] * step
+    aa = count[near] - np.sum(step[:, :-1] ** 2, axis=1)
+    ab = first[near] - u * count[near] - np.sum(step[:, :-1] * hinge[:, :-1], axis=1)
+    bb = second[near] - 2.0 * u * first[near] + u**2 * count[near] - np.sum(hinge[:, :-1] ** 2, axis=1)
+    slope = _ratio(hinge[:, -1], bb)
+    jump = step[:, -1] - slope * ab
+    gained = slope * hinge[:, -1] + _ratio(jump, aa - _ratio(ab, bb) * ab) * jump
+    best = near[np.argmax(gained)]
+    return replace(line, offset=line.offset + float(s[best] + s[best + 1]) / 2.0)
 
 
-def gaps(regression: Regression, line: Line) -> NDArray:
-    """Values along the line's normal at which a step changes, within the reach of one candidate's spacing."""
-    values = np.unique(regression.s[line.direction])
-    near = values[np.abs(values - line.offset) < max(2.0 / CANDIDATES, regression.resolution)]
-    return near if near.size <= MOST_GAPS else near[:: near.size // MOST_GAPS + 1]
-
-
-def last_below(regression: Regression, line: Line, place: float) -> float:
-    """The last reading below a place along the line's normal; the place itself if there is none."""
-    values = regression.s[line.direction]
-    below = values[values < place]
-    return float(below.max()) if below.size else place
+def _ratio(part: NDArray, whole: NDArray) -> NDArray:
+    """Share of a column that is left; none of one that the others hold."""
+    sound = whole > 0.0
+    return np.where(sound, part / np.where(sound, whole, 1.0), 0.0)
