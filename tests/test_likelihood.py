@@ -147,7 +147,7 @@ def test_two_lanes_are_what_each_of_them_is_alone(chain_nuisances, smooth):
 
 
 def test_more_starts_than_lanes_are_refused(chain_nuisances, smooth):
-    with pytest.raises(ValueError, match=r"At most 4 starts fit into one call; got 5\."):
+    with pytest.raises(ValueError, match=r"At most 2 starts fit into one call; got 5\."):
         Posterior(together(*[smooth.hypothesis] * 5), [chain_nuisances])
 
 
