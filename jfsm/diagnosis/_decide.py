@@ -42,9 +42,7 @@ class Decision:
     @property
     def named_term(self) -> AbstractTerm | None:
         """The winner's term, if a law was named."""
-        cause = self.winner.cause
-        named = self.verdict == "cause" and cause is not None and not cause.is_sensor
-        return self.winner.structure.terms[-1] if named else None
+        return self.winner.law if self.verdict == "cause" else None
 
     def share(self, trial: Trial) -> float:
         """Probability of a trial; 0 for one that is no alternative."""
@@ -131,8 +129,7 @@ def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
     over_refit, over_given = explained(t, refitted), explained(t, given)
     if not math.isfinite(t.evidence) or over_refit == -math.inf:
         return "its motion runs away"
-    if t.cause is not None and not t.cause.is_sensor:
-        law = t.structure.terms[-1]
+    if (law := t.law) is not None:
         springs = [s for s in t.structure.terms if isinstance(s, LinearStiffness) and set(s.at) == set(law.at)]
         if other := law.otherwise(sum(float(s.k) for s in springs)):
             return other

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..identification import Hypothesis, Maximum, Nuisances, Posterior, Unknown, without_small_offsets
-from ..structures import Cause, Structure
+from ..structures import AbstractTerm, Cause, Structure
 
 _FILTERED, _PREDICTED = 2.0, 3.0
 """Periods of filtering before, and of free prediction in, every window."""
@@ -55,6 +55,11 @@ class Trial:
     def name(self) -> str:
         """Cause id, or what the hypothesis is."""
         return self.cause.id if self.cause else str(self.at[0])
+
+    @property
+    def law(self) -> AbstractTerm | None:
+        """The term that a cause adds; None of a sensor's effect, and of what has no cause."""
+        return None if self.cause is None or self.cause.is_sensor else self.structure.terms[-1]
 
     def extended(self) -> Structure:
         """The structure without the offsets that are not significant."""

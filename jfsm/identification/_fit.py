@@ -160,7 +160,8 @@ def _best(beginnings: Sequence[tuple], prepared: Sequence[Nuisances]) -> tuple[P
     lanes = lanes_of(beginnings[0][0])
     lots = [beginnings[i : i + lanes] for i in range(0, len(beginnings), lanes)]
     posteriors = [Posterior(Hypothesis(*zip(*lot, strict=True)), prepared) for lot in lots]
-    posteriors[0].evaluate(posteriors[0].initial())  # compiled once, before all ask for it
+    if len(posteriors) > 1:
+        posteriors[0].evaluate(posteriors[0].initial())  # compiled once, before all ask for it
     rungs = list(side_by_side(approach, posteriors))
     order = np.argsort([float(np.min(rung.value)) for rung in rungs])[:_PURSUED]
     tops = list(side_by_side(lambda k: (posteriors[k], finish(posteriors[k], rungs[k], _STEPS)), order))

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from ..._types import evenly_taken
 from .line import Line
 from .places import CANDIDATES
 from .regression import FLOOR, Regression
@@ -52,7 +53,7 @@ def sides(regression: Regression, line: Line, rest: NDArray, jump: float) -> tup
     if not gaps.size:
         return line.offset, line.offset - reach, line.offset + reach
     while True:
-        some = gaps[np.unique(np.linspace(0, len(gaps) - 1, AT_ONCE).astype(int))]
+        some = gaps[evenly_taken(len(gaps), AT_ONCE)]
         likelihood = looks / regression.n * _likelihood(s, below, beyond, middle[some], widths)
         likely = np.flatnonzero(likelihood > likelihood.max() - DROP)
         first, last = some[max(likely[0] - 1, 0)], some[min(likely[-1] + 1, len(some) - 1)]
