@@ -137,6 +137,34 @@ def test_a_gain_error_of_the_accelerometer_is_found_where_it_sits():
     assert d.findings[0].parameters["eps"].value == pytest.approx(0.1, abs=0.01)
 
 
+FAULTS = ("accel_bias", "preload", "clipping", "channel_delay", "force_delay", "quadratic_stiffness")
+
+
+@pytest.mark.parametrize(("cause", "at", "name", "truth"), [
+    ("accel_bias", ("acceleration", 1), "b", 0.5),
+    ("preload", (0, 1), "F", 1.0),
+    ("clipping", ("displacement", 1), "limit", 1.8),
+    ("clipping", ("force", 1), "limit", 8.0),
+    ("channel_delay", ("displacement", 1), "tau", 3 * STEP),
+])  # fmt: skip
+def test_faults_of_the_measuring_chain_and_a_constant_force_are_named(cause, at, name, truth):
+    right = jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING)
+    record = made(lambda x, v: linear(x, v) - truth if cause == "preload" else linear(x, v))
+    read = {kind: y.copy() for (kind, _), y in record.channels.items()}
+    if cause == "accel_bias":
+        read["acceleration"] += truth
+    elif cause == "clipping":
+        read[at[0]] = np.clip(read[at[0]], -truth, truth)
+        assert 0.01 < np.mean(np.abs(read[at[0]]) == truth) < 0.2
+    elif cause == "channel_delay":
+        read["displacement"] = np.concatenate([np.zeros(3), read["displacement"][:-3]])
+    again = jfsm.Record(record.time, **read, at_rest=True)
+    d = jfsm.diagnose(again, right, causes=FAULTS, key=jax.random.key(0))
+    assert (d.verdict, d.findings[0].cause, d.findings[0].at) == ("cause", cause, at)
+    assert d.findings[0].parameters[name].value == pytest.approx(truth, rel=0.1)
+    assert d.gain is not None and d.gain.after < d.gain.before
+
+
 def test_a_law_that_is_not_looked_for_gets_no_name_and_a_map_that_runs():
     def stop(x, v):
         return linear(x, v) + 60.0 * np.maximum(x - 0.4, 0.0)
@@ -189,13 +217,13 @@ def test_records_without_response_or_too_short_are_refused(believed):
         jfsm.diagnose([record.time], believed)  # pyright: ignore[reportArgumentType]
 
 
-def test_the_most_promising_laws_are_fitted_and_every_sensor():
+def test_the_most_promising_laws_are_fitted_and_whatever_no_missing_force_tells_of():
     known, start = jfsm.causes(), jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING)
     laws = [Candidate(known["coulomb"], (0, j), (start,), 0.01 * j) for j in range(12)]
     nowhere = Candidate(known["jenkins"], (0, 1), (), 0.0)
-    sensor = Candidate(known["force_gain"], ("force", 1), (start,))
-    followed, left_out = promising([*laws, nowhere, sensor])
-    assert followed == [*laws[4:], sensor]
+    untold = [Candidate(known["force_gain"], ("force", 1), (start,)), Candidate(known["preload"], (0, 1), (start,))]
+    followed, left_out = promising([*laws, nowhere, *untold])
+    assert followed == [*laws[4:], *untold]
     assert left_out == [*laws[:4], nowhere]
 
 

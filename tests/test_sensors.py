@@ -81,3 +81,15 @@ def test_a_fit_finds_a_delay_or_a_bias(effect, path, truth):
     low, high = found.intervals[path]
     assert low - (high - low) < truth < high + (high - low)
     assert high - low < 0.2 * truth
+
+
+def test_a_late_displacement_alone_is_told_no_better_than_an_early_force():
+    tau, rng = 0.17, np.random.default_rng(5)  # three samples and a part
+    fine = np.linspace(-1.0, T[-1], 20 * (T.size - 1 + 20) + 1)
+    x = jfsm.simulate(MODEL, jfsm.Record(fine, force(fine)), initial_state=(0.1, 0.0)).displacement[:, 0]
+    shown = np.interp(T - tau, fine, x) + 0.002 * np.std(x) * rng.standard_normal(T.size)
+    record = jfsm.Record(T, force(T), shown)
+    late = jfsm.fit(MODEL + jfsm.ChannelDelay(0.1, at=("displacement", 1)), record)
+    early = jfsm.fit(MODEL + jfsm.ForceDelay(-0.1, at=("force", 1)), record)
+    assert late.values["channel_delay@displacement-1.tau"] == pytest.approx(tau, rel=0.01)
+    assert late.log_likelihood == pytest.approx(early.log_likelihood, abs=3.0)

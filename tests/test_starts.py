@@ -4,11 +4,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from references import smooth_motion
+from scipy.integrate import solve_ivp
 
 import jfsm
 from jfsm.dynamics import lower
 from jfsm.dynamics._along import force_along
-from jfsm.identification import prepare, starts
+from jfsm.identification import missing_force, place, prepare, scale_of, starts
 
 T = np.arange(1200) * 0.06
 MODEL = jfsm.Structure.sdof(1.0, 9.0, 0.3)
@@ -53,6 +54,27 @@ def test_a_side_and_an_origin_of_time_are_no_matter_of_search():
     wrong = MODEL + jfsm.BilinearStiffness(1.0, 0.0, -1.0, at=(0, 1))
     for found in starts(wrong, prepare(r, wrong)):
         assert found.values()["bilinear_stiffness@0-1.side"] == -1.0
+
+
+def test_what_comes_to_rest_is_judged_while_it_moves():
+    def friction(t, y):
+        return [y[1], -9.0 * y[0] - 0.3 * y[1] - 0.4 * np.tanh(y[1] / 1e-3)]
+
+    x, v = solve_ivp(friction, (0, T[-1]), [2.0, 0.0], t_eval=T, rtol=1e-8, atol=1e-10, method="LSODA").y
+    noise = 0.01 * np.random.default_rng(6).standard_normal((2, T.size))
+    r = jfsm.Record(T, displacement=x + noise[0], velocity=v + 3 * noise[1])
+    prepared, law = prepare(r, MODEL), jfsm.Coulomb(1.0, at=(0, 1))
+    assert np.mean(np.abs(v) < 1e-3) > 0.5
+    (found,) = place(law, missing_force(MODEL, prepared), MODEL, scale_of(prepared, MODEL), prepared)
+    assert found.share > 0.7
+    assert found.term.F == pytest.approx(0.4, rel=0.2)
+
+
+def test_regression_cannot_tell_a_constant_force_from_an_offset():
+    r = record(lambda x, v: 1.0 + 0.0 * x)
+    prepared, law = prepare(r, MODEL), jfsm.Preload(1.0, at=(0, 1))
+    (found,) = place(law, missing_force(MODEL, prepared), MODEL, scale_of(prepared, MODEL), prepared)
+    assert found.share is None
 
 
 def test_a_linear_structure_has_no_other_start():

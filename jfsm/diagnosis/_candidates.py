@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import compress, zip_longest
+from itertools import compress, product, zip_longest
 
 from ..estimation import Latent
 from ..identification import (
@@ -23,13 +23,15 @@ from ..identification import (
     scale_of,
     with_offsets,
 )
-from ..structures import Cause, Structure, causes
+from ..structures import AccelerationBias, Cause, Structure, causes
 
 _START, _START_AT_PEAK = 0.1, 0.3
 """First guess of an effect as a share of the elastic force, in the mean and at the largest displacement.
 
 A softening spring that outweighs the elastic one at a peak would let the motion run away from the start.
 """
+_START_LATE = 0.5
+"""Second guess of a delay, in radians of the motion."""
 
 
 _SHAPES = 2
@@ -42,8 +44,8 @@ _FOLLOWED = 8
 class Candidate:
     """A cause at a place; `starts` are the structures that a fit begins from.
 
-    `share` is how much of the missing force the best of them explains by regression; None for sensors, which lack none.
-    A law that no shape of which explains any has no starts.
+    `share` is how much of the missing force the best of them explains by regression; None where regression cannot tell,
+    as of sensors, which lack no force. A law that no shape of which explains any has no starts.
     """
 
     cause: Cause
@@ -84,9 +86,9 @@ def candidates(
     found, laws = [], _Laws(model, records[0])
     for cause in selection.values():
         if not any(p.free for p in cause.effect.parameters):
-            continue  # nothing to fit: what a clipped channel lost takes no part anyway
+            continue  # nothing to fit: a clipped channel shows by itself
         if cause.is_sensor:
-            kinds = [kind for kind in cause.effect.channels if _has_scale(kind, records)]
+            kinds = [kind for kind in cause.effect.channels if _shows(cause.effect, kind, records)]
             spots = dict.fromkeys(c for n in records for c in n.record.channels if c[0] in kinds)
             found += [Candidate(cause, at, _natural_starts(model, cause, at, records[0])) for at in spots]
         else:
@@ -115,18 +117,18 @@ class _Laws:
     def candidate(self, cause: Cause, at: tuple[int, int]) -> Candidate:
         law = cause.effect(**cause.effect.shapes(self.scale)[0], at=at)
         placed = place(law, self.missing, self.model, self.scale, self.nuisances, sides=True, sign=cause.sign)
-        starts = [self.model + start.term for start in placed[:_SHAPES]]
+        starts = [self.model + start.term for start in placed[:_SHAPES] if start.share is not None]
         if len(cause.effect.parameters) == 1:  # has one shape; a missing force that is ill seen may not show its size
             natural = _natural_starts(self.model, cause, at, self.nuisances)
             starts += natural[: min(_SHAPES, lanes_of(natural[0])) - len(starts)]
         return Candidate(cause, at, tuple(starts), placed[0].share if placed else 0.0)
 
 
-def _has_scale(kind: str, records: Sequence[Nuisances]) -> bool:
-    """Whether anything but the channels of this kind tells how large they should be."""
+def _shows(effect: type, kind: str, records: Sequence[Nuisances]) -> bool:
+    """Whether anything but the channels of this kind tells how large and how late they are; a bias needs none."""
     if kind == "force":
         return any(driven(n) for n in records)
-    return any(driven(n) or any(c[0] != kind for c in n.channels) for n in records)
+    return effect is AccelerationBias or any(driven(n) or any(c[0] != kind for c in n.channels) for n in records)
 
 
 def driven(nuisances: Nuisances) -> bool:
@@ -140,11 +142,13 @@ def _natural_starts(model: Structure, cause: Cause, at: tuple, nuisances: Nuisan
     # A law of degree n in the displacement weighs crest^(n - 1) times more at the largest displacement.
     degree = 1 if parameter.time else -parameter.length
     share = min(_START, _START_AT_PEAK / nuisances.crest ** max(degree - 1, 0))
-    for sign in (cause.sign,) if cause.sign else (1, -1):
+    # The basin of a delay is no wider than a part of a period.
+    shares = (share, _START_LATE) if cause.is_sensor and parameter.time == 1 else (share,)
+    for sign, size in product((cause.sign,) if cause.sign else (1, -1), shares):
         unit = cause.effect(**{p.name: float(sign) for p in cause.effect.parameters}, at=at)
         extended = model + unit
         path = next(p for p in extended.entries() if p not in model.entries())
-        structures.append(extended.with_values({path: sign * share * natural_size(extended, path, nuisances)}))
+        structures.append(extended.with_values({path: sign * size * natural_size(extended, path, nuisances)}))
     return tuple(structures)
 
 
@@ -155,7 +159,8 @@ def own_paths(model: Structure, records: Sequence[Nuisances]) -> tuple[str, ...]
     """
     scaled = any(driven(n) for n in records)
     values = model.values()
-    return tuple(p for p in model.entries() if values[p] != 0 and (scaled or not p.startswith("mass@")))
+    free = [p for p, (what, _) in model.entries().items() if what.free and values[p] != 0]
+    return tuple(p for p in free if scaled or not p.startswith("mass@"))
 
 
 def hypothesis(

@@ -51,9 +51,8 @@ class Decision:
 
 def adequate(trial: Trial) -> bool:
     """Whether a trial leaves nothing but noise: white innovations of the size of the floor, no excess."""
-    excess = math.sqrt(float(np.max(trial.prediction.excess)))
     scales = np.abs(trial.noise[trial.trusted])
-    return trial.whiteness < _WHITE and bool(np.all(scales < _SCALE)) and excess < NEGLIGIBLE
+    return trial.whiteness < _WHITE and bool(np.all(scales < _SCALE)) and trial.prediction.left < NEGLIGIBLE
 
 
 def explained(trial: Trial, baseline: Trial) -> float:
@@ -145,13 +144,10 @@ def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
 
 
 def _verdict(given: Trial, refitted: Trial, winner: Trial, tried: Sequence[Trial], mapped: Trial | None) -> str:
-    def leaves(t: Trial) -> float:
-        return math.sqrt(float(np.max(t.prediction.excess)))
-
     clean = adequate(winner)
-    if winner.evidence - given.evidence < SIGNIFICANT and (clean or leaves(given) < NEGLIGIBLE):
+    if winner.evidence - given.evidence < SIGNIFICANT and (clean or given.prediction.left < NEGLIGIBLE):
         return "consistent"
-    if leaves(given) < NEGLIGIBLE and not clean:
+    if given.prediction.left < NEGLIGIBLE and not clean:
         return "consistent"
     if clean:
         return "parameters" if winner is refitted else "cause" if winner.cause else "consistent"
@@ -159,10 +155,10 @@ def _verdict(given: Trial, refitted: Trial, winner: Trial, tried: Sequence[Trial
     stands_in = mapped is not None and explained(mapped, winner) >= GATE
     if winner.cause is not None:
         # The nearest neighbour of a law that is not in the catalogue explains much of it, and leaves much.
-        short = explained(winner, refitted) < _NEARLY_ALL and leaves(winner) > _MUCH
+        short = explained(winner, refitted) < _NEARLY_ALL and winner.prediction.left > _MUCH
         return "unnamed" if stands_in else "undecided" if short else "cause"
     if stands_in:
         return "unnamed"
-    if winner is refitted and explained(refitted, given) >= GATE and leaves(refitted) < 2 * NEGLIGIBLE:
+    if winner is refitted and explained(refitted, given) >= GATE and refitted.prediction.left < 2 * NEGLIGIBLE:
         return "parameters"
     return "undecided"

@@ -13,6 +13,7 @@ from ..identification import Nuisances, prepare
 from ..records import Record
 from ..structures import Cause, Structure
 from ._candidates import candidates, chosen_causes, promising
+from ._clipped import beside_clipping, limited
 from ._decide import decide
 from ._diagnosis import Diagnosis
 from ._gain import measure_gain
@@ -78,6 +79,10 @@ def diagnose(
     chosen = chosen_causes(causes)
     whole = [whole for whole, _ in training]
     until = [fit for _, fit in training]
+    clipped = limited(whole, model) if "clipping" in chosen else []
+    stated = model
+    for sensor in clipped:
+        model = model + sensor
     records = [prepare(r, model, reconstruction) for r in whole]
     tried, left_out = promising(candidates(model, records, chosen, places))
     steps = _Steps(progress, 4)
@@ -95,6 +100,8 @@ def diagnose(
     steps.next("the missing force")
     periods = sum(n.record.duration for n in records) * records[0].omega / (2 * math.pi)
     decision = decide(given, refitted, trials, lambda t: stand_in(t, records, until), periods)
+    if clipped:
+        decision = beside_clipping(decision, clipped, refitted)
     extended = model if decision.verdict == "consistent" else decision.winner.extended()
     term = decision.named_term
     # Shown beside a law is the force that it stands for, with the own values that go with it.
@@ -107,9 +114,9 @@ def diagnose(
         first = records[0]
         noise = _noise_levels(decision.winner, first)
         gain, runs = measure_gain(
-            model, refitted.extended(), extended, held, noise, first.omega, first.reconstruction, key
+            stated, refitted.extended(), extended, held, noise, first.omega, first.reconstruction, key
         )
-    return assemble(decision, refitted, trials, left_out, model, extended, records, missing, gain, runs)
+    return assemble(decision, clipped, refitted, trials, left_out, model, extended, records, missing, gain, runs)
 
 
 def _outweighed(model: Structure, refitted: Structure) -> bool:

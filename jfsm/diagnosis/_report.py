@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from ..identification import Nuisances
-from ..structures import PARAMETER_CAUSES, Structure
+from ..structures import PARAMETER_CAUSES, Clipping, Structure, causes
 from ._candidates import Candidate
+from ._clipped import finding
 from ._decide import Decision
 from ._detectable import detectable
 from ._diagnosis import CandidateResult, Diagnosis, Estimate, Finding, Rival
@@ -24,6 +25,7 @@ _SHOWN = 2000
 
 def assemble(
     decision: Decision,
+    clipped: list[Clipping],
     refitted: Trial,
     trials: list[Trial],
     left_out: list[Candidate],
@@ -37,6 +39,8 @@ def assemble(
     """The diagnosis, with everything that the report needs."""
     units = records[0].record.units
     findings = _findings(decision, trials, model, units)
+    if decision.verdict == "cause":
+        findings += tuple(finding(sensor, units[sensor.at[0]]) for sensor in clipped)
     candidates = (
         *(_candidate(t, decision, refitted, model, units) for t in sorted(trials, key=lambda t: -t.evidence)),
         *(_passed_over(c) for c in sorted(left_out, key=lambda c: -(c.share or 0.0))),
@@ -179,11 +183,11 @@ def _words(decision: Decision, findings: tuple[Finding, ...], gain: Gain | None)
     if decision.verdict == "parameters":
         what = "; ".join(f.sentence for f in findings) or "its own values moved together"
         return f"The form of the model is right, its values are off: {what}.{share}", "Use the refitted values."
-    if decision.verdict == "cause" and decision.winner.cause is not None:
+    if decision.verdict == "cause":
         f = findings[0]
-        where = "-".join(str(a) for a in f.at)
-        lacks = "The record shows" if decision.winner.cause.is_sensor else "The model lacks"
-        return f"{lacks} {decision.winner.cause.label} at {where}: {f.sentence}.{share}", "Use the extended model."
+        cause, where = decision.winner.cause or causes()["clipping"], "-".join(str(a) for a in f.at)
+        lacks = "The record shows" if cause.is_sensor else "The model lacks"
+        return f"{lacks} {cause.label} at {where}: {f.sentence}.{share}", "Use the extended model."
     if decision.verdict == "unnamed":
         return (
             f"A real effect is there that no catalogue entry explains; a map stands in.{share}",

@@ -19,7 +19,10 @@ _FAR_BEHIND = 200.0
 _ALWAYS_PURSUED = 4
 """unless it is among the best of them."""
 _STILL_OPEN = 10
-"""Lots that go on after an early rung, at least; half of them in any case."""
+"""Lots that go on after an early rung, at least; half of them in any case,"""
+_PROMISING = 4
+"""and the laws that explain most of the missing force, and causes of which it tells nothing: what they are worth, a few
+steps may not show."""
 
 
 Beginning = tuple[Candidate, Structure, Mapping[str, float] | None]
@@ -38,14 +41,15 @@ class _Lot:
             for i in range(0, len(starts), lanes)
         ]
         self.label = f"{candidates[0].cause.label} at {'-'.join(map(str, candidates[0].at))}"
+        self.share = max(math.inf if candidate.share is None else candidate.share for candidate in candidates)
         self.program, self.behind = posteriors[0].program, 0.0
         self.climb = self._climb(posteriors, candidates, lanes)
 
     def _climb(self, posteriors: Sequence[Posterior], candidates: tuple[Candidate, ...], lanes: int):
-        # Where one climbs alone it is the one that begins best.
+        # Where one climbs alone it is the one that begins best, seen from where not too much is forgiven.
         best = 0
         if len(posteriors) > 1:
-            best = int(np.argmin([np.min(p.evaluate(p.initial(), _LADDER[0])[0]) for p in posteriors]))
+            best = int(np.argmin([np.min(p.evaluate(p.initial(), _LADDER[1])[0]) for p in posteriors]))
         self.posterior, self.candidates = posteriors[best], candidates[best * lanes :][:lanes]
         yield from rungs(self.posterior, _LADDER)
 
@@ -117,9 +121,11 @@ def search(
     for together in (compiling.values(), [lot for lot in lots if lot is not compiling[lot.program]]):
         for lot in side_by_side(_Lot.step, together):
             tell(lot.label, 2 * len(lots))
+    most = sorted((candidate.share or 0.0 for candidate in tried), reverse=True)[:_PROMISING]
     pursued = lots
     for _ in _LADDER[1:]:
-        pursued = _near(pursued, max(_STILL_OPEN, len(pursued) // 2))
+        near = _near(pursued, max(_STILL_OPEN, len(pursued) // 2))
+        pursued = [lot for lot in pursued if lot in near or lot.share >= most[-1] > 0]
         list(side_by_side(_Lot.step, pursued))
     pursued = _near(pursued, _ALWAYS_PURSUED, refitted.rung)
 

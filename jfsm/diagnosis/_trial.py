@@ -1,5 +1,6 @@
 """One hypothesis fitted: its values, its evidence, and how well it predicts."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,11 @@ _FILTERED, _PREDICTED = 2.0, 3.0
 """Periods of filtering before, and of free prediction in, every window."""
 _RUN_AWAY = 1e6
 """Error, in spreads of a channel, at which a prediction counts as run away."""
+_SLIGHT = 3.0
+"""Offset of a force or an acceleration, in widths of what is believed of it, up to which it is no more than a nuisance.
+"""
+_CHANCE = 2.0
+"""Standard deviations by which noise may leave more than it does in the mean."""
 _SLACKS = (0.0, 0.01, 0.05)
 """How loosely the state may be held while it is filtered; each hypothesis is judged by its best."""
 
@@ -19,16 +25,24 @@ _SLACKS = (0.0, 0.01, 0.05)
 class Prediction:
     """Free prediction over some periods, in units of each channel's spread, squared and summed over channels.
 
-    `error` is what was seen, `expected` what noise alone would leave; both per set (training, held out, ...).
+    `error` is what was seen, `expected` what noise alone would leave, `scatter` the standard deviation of that; all per
+    set (training, held out, ...).
     """
 
     error: np.ndarray
     expected: np.ndarray
+    scatter: np.ndarray
 
     @property
     def excess(self) -> np.ndarray:
         """Power beyond noise, per set."""
         return np.maximum(self.error - self.expected, 0.0)
+
+    @property
+    def left(self) -> float:
+        """What is left beyond noise and chance, as a share of the signal; of the worst set."""
+        beyond = self.error - self.expected - _CHANCE * self.scatter
+        return math.sqrt(max(float(np.max(beyond)), 0.0))
 
 
 @dataclass(frozen=True)
@@ -85,10 +99,12 @@ def sets(nuisances: Nuisances, until: int) -> list[np.ndarray]:
 
 
 def predict(posterior: Posterior, theta: np.ndarray) -> Prediction:
-    """Multi-step prediction of a hypothesis with one start."""
-    best: list[tuple[float, np.ndarray, np.ndarray]] = []
+    """Multi-step prediction of a hypothesis with one start; an offset that would be a cause explains nothing."""
+    slight = [u.path.startswith(("offset@force", "offset@acceleration")) for u in posterior.hypothesis.unknowns[0]]
+    theta = np.where(slight, np.clip(theta, -_SLIGHT, _SLIGHT), theta)
+    best: list[tuple[float, Prediction]] = []
     for slack in _SLACKS:
-        errors, expected = [], []
+        errors, expected, scatter = [], [], []
         for index, nuisances in enumerate(posterior.records):
             use, scored = _windows(nuisances)
             found = posterior.innovations(theta, index, use=use, noise_scales=False, slack=slack)
@@ -99,11 +115,15 @@ def predict(posterior: Posterior, theta: np.ndarray) -> Prediction:
                 count = np.maximum(mask.sum(0), 1)
                 share = np.clip(found.error / nuisances.spread, -_RUN_AWAY, _RUN_AWAY)
                 errors.append(np.sum(np.sum(np.where(mask, share**2, 0.0), 0) / count))
-                expected.append(np.sum(np.sum(np.where(mask, truth.variance, 0.0), 0) / count / nuisances.spread**2))
+                noise = np.sum(np.where(mask, truth.variance, 0.0), 0) / count / nuisances.spread**2
+                white = np.minimum(np.asarray(nuisances.readings.variance) / nuisances.spread**2, noise)
+                # Readings err each by itself, a state that was filtered for a whole window: in two directions.
+                windows = np.maximum(count * nuisances.record.dt * nuisances.omega / (2 * np.pi * _PREDICTED), 1.0)
+                expected.append(np.sum(noise))
+                scatter.append(np.sqrt(np.sum(2 * white**2 / count + (noise - white) ** 2 / windows)))
         error = np.nan_to_num(np.array(errors), nan=np.inf)
-        best.append((float(np.sum(error)), error, np.array(expected)))
-    _, error, expected = min(best, key=lambda item: item[0])
-    return Prediction(error, expected)
+        best.append((float(np.sum(error)), Prediction(error, np.array(expected), np.array(scatter))))
+    return min(best, key=lambda item: item[0])[1]
 
 
 def _windows(nuisances: Nuisances) -> tuple[np.ndarray, np.ndarray]:

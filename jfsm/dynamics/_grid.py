@@ -41,6 +41,16 @@ def punctual(plant: Plant, fine: Fine) -> Fine:
     return Fine(shifted[take], fine.base, fine.time, fine.step)
 
 
+def drive_before(fine: Fine, tau: Float[Array, ""]) -> tuple[Float[Array, "n 5 dof"], Float[Array, "n 5"]]:
+    """Forces, and accelerations of the base, from each sample back to tau earlier: two steps in time, on half steps."""
+    n, halves, dof = fine.force.shape
+    rows = jnp.concatenate([fine.force, fine.base[..., None]], 2)
+    flat = jnp.concatenate([rows[:, :-1].reshape(n * (halves - 1), dof + 1), rows[-1:, -1]])
+    places = -tau / fine.step * (halves - 1) * jnp.linspace(0.0, 1.0, 5)
+    earlier = jax.vmap(jax.vmap(_shifted, (1, None), 1), (None, 0), 1)(flat, places)[: n * (halves - 1) : halves - 1]
+    return earlier[..., :dof], earlier[..., dof]
+
+
 def _shifted(values: Float[Array, " n"], places: Float[Array, ""]) -> Float[Array, " n"]:
     """Values so many places further on, by the cubic through four neighbours."""
     whole = jax.lax.stop_gradient(jnp.floor(places))

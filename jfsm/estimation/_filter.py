@@ -14,13 +14,12 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..dynamics._forces import friction_limits, settle
-from ..dynamics._grid import Fine, advance_sample, begin, load_of, punctual, remember
+from ..dynamics._grid import Fine, advance_sample, begin, drive_before, load_of, punctual, remember, true_force
 from ..dynamics._plant import Plant, Readout
 from ..dynamics._stepper import (
     Load,
     Motion,
     acceleration,
-    advance,
     free_acceleration,
     holding_force,
     inverse_mass,
@@ -107,11 +106,11 @@ def innovations(
 
     def body(carry, inputs):
         motion, past, covariance = carry
-        force, base, time, y, use, valid = inputs
+        force, base, time, y, use, valid, before = inputs
         g = load_of(plant, minv, motion, past, force, base, time, dt)
         mean, updated, error, spread = _update(
-            plant, minv, show, motion, covariance, Load(g[:3], base[:3], time, dt / fine.substeps), y, use, variances,
-            nothing,
+            plant, minv, show, motion, covariance, Load(g[:3], base[:3], time, dt / fine.substeps), before, y, use,
+            variances, nothing,
         )  # fmt: skip
         x, v, z = mean[:dof], mean[dof : 2 * dof], mean[2 * dof :]
         # A link that sticks stays so while the update leaves it at rest; otherwise its speed decides.
@@ -129,7 +128,8 @@ def innovations(
         ), Innovations(error, spread)
 
     motion, past = begin(plant, minv, start.x, start.v, fine)
-    inputs = (fine.force, fine.base, fine.time, readings.values, readings.use, readings.valid)
+    before = tuple(drive_before(fine, tau) for tau in plant.channel_delay)
+    inputs = (fine.force, fine.base, fine.time, readings.values, readings.use, readings.valid, before)
     return jax.lax.scan(body, (motion, past, start.covariance), inputs)[1]
 
 
@@ -174,13 +174,13 @@ def _rest(plant, minv, covariance, mode):
     return covariance
 
 
-def _update(plant, minv, show, motion: Motion, covariance, load: Load, y, use, variances, nothing):
-    """State after the readings of one sample, and their innovations; `load` is that of the sample's first step, and
-    speeds of links up to `nothing` are none."""
-    mean = before = jnp.concatenate([motion.x, motion.v, motion.z])
+def _update(plant, minv, show, motion: Motion, covariance, load: Load, before, y, use, variances, nothing):
+    """State after the readings of one sample, and their innovations; `load` is that of the sample's first step,
+    `before` what drove it earlier, and speeds of links up to `nothing` are none."""
+    mean = at_first = jnp.concatenate([motion.x, motion.v, motion.z])
     late = [
-        (channel, *_late(plant, minv, show, tau, mean, motion.mode, load))
-        for tau, channel in zip(plant.channel_delay, plant.late_channel, strict=True)
+        (channel, *_late(plant, minv, show, tau, mean, motion.mode, load, *drive))
+        for tau, channel, drive in zip(plant.channel_delay, plant.late_channel, before, strict=True)
     ]
     errors, spreads = [], []
     for c in range(y.shape[0]):
@@ -189,7 +189,7 @@ def _update(plant, minv, show, motion: Motion, covariance, load: Load, y, use, v
             plant, minv, show, c, mean, covariance, motion.mode, load, y[c], variances[c], gain, nothing
         )
         for channel, then, rows in late:  # what other channels have told of the motion by now moves it along its slope
-            predicted = jnp.where(channel == c, then[c] + jnp.sum(rows[c] * (mean - before)), predicted)
+            predicted = jnp.where(channel == c, then[c] + jnp.sum(rows[c] * (mean - at_first)), predicted)
             row = jnp.where(channel == c, rows[c], row)
         error = y[c] - gain * predicted - plant.channel_offset[c]
         row = gain * row
@@ -218,28 +218,23 @@ def _predict(plant, minv, show, c, mean, covariance, mode, load: Load, y, varian
     return jnp.sum(select * (a + load.base[0])), jnp.sum(select[:, None] * by_state, 0)
 
 
-def _late(plant, minv, show, tau, mean, mode, load: Load):
-    """Readings (channels,) of the motion of a moment ago, one step back in time, and their derivative by the state."""
+def _late(plant, minv, show, tau, mean, mode, load: Load, force, base):
+    """Readings (channels,) of the motion of a moment ago, two steps back in time, and their derivative by the state.
+
+    `force` (5, dof) and `base` (5,) are what was measured from now back to then. What answers the past stays as it is.
+    """
     dof = plant.dof
+    measured = true_force(plant, force, base)
+    g = measured + (load.force[0] - measured[0])[None, :]
 
     def readings(mean):
         now = Motion(mean[:dof], mean[dof : 2 * dof], mean[2 * dof :], mode)
-        back = _backward(load, tau)
-        then = advance(plant, minv, now, back)
-        a = acceleration(plant, minv, *then, back.force[2], back.time - tau)[0]
-        shown = {"displacement": then.x, "velocity": then.v, "acceleration": a + back.base[2]}
+        then = advance_sample(plant, minv, now, g, base, load.time, -tau)
+        a = acceleration(plant, minv, *then, g[-1], load.time - tau)[0]
+        shown = {"displacement": then.x, "velocity": then.v, "acceleration": a + base[-1]}
         return jnp.stack([jnp.sum(row * shown[kind]) for row, kind in zip(show.select, show.kinds, strict=True)])
 
     return jax.vmap(lambda e: jax.jvp(readings, (mean,), (e,)), out_axes=(None, 1))(jnp.eye(mean.size))
-
-
-def _backward(load: Load, tau) -> Load:
-    """A step of -tau from where a load begins, its force continued by the parabola."""
-    shares = -tau / load.step * jnp.array([0.0, 0.5, 1.0])
-    force = jnp.stack([load.at(shares[i]) for i in range(3)])
-    a, b, c = load.base[0], load.base[1], load.base[2]
-    base = a + shares * (4 * b - 3 * a - c) + shares * shares * (2 * a + 2 * c - 4 * b)
-    return Load(force, base, load.time, -tau)
 
 
 def _acceleration_and_slope(plant, minv, mean, mode, load: Load):

@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
 from jaxtyping import Array, Float
+from scipy.ndimage import maximum_filter1d
 
 from ..dynamics._along import force_along
 from ..dynamics._grid import Fine
@@ -27,6 +28,8 @@ _MEMORIES = (0.15, 1.0)
 _AMPLITUDES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 """Its amplitude, as a share of the elastic force."""
 _WIDE = 10.0
+_CERTAIN = 5.0
+"""Velocity, in its standard errors, from which something moves."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +42,15 @@ class Latent:
         `force` stands on the left-hand side, restoring side positive, beside everything the model has.
     std : (n, dof) array
         Standard error of `force`.
+    moves : (n,) array of bool
+        Whether anything moved within half a period, beyond the error of its velocity.
     """
 
     displacement: np.ndarray
     velocity: np.ndarray
     force: np.ndarray
     std: np.ndarray
+    moves: np.ndarray
 
 
 class _Model(NamedTuple):
@@ -102,7 +108,9 @@ def latent_force(
     dof = plant.dof
     x, v, r = mean[:, :dof], mean[:, dof : 2 * dof], mean[:, 2 * dof :]
     known = np.asarray(force_along(plant, jnp.asarray(x), jnp.asarray(v), fine.time[:n]))
-    return Latent(x, v, r - known, std[:, 2 * dof :])
+    period = max(int(2 * np.pi / (omega * dt)), 1)
+    moves = maximum_filter1d(np.abs(v), period, axis=0) > _CERTAIN * std[:, dof : 2 * dof]
+    return Latent(x, v, r - known, std[:, 2 * dof :], np.any(moves, 1))
 
 
 def _model(

@@ -33,15 +33,20 @@ _RUN_AWAY = 1e9
 """Force of a hidden state that its steps could not follow, as a multiple of the missing one."""
 _LEAST = 1e-4
 """Size of an effect, as a share of the elastic force, below which it is no start."""
+_ALMOST_NONE = 1e-6
+"""Share of a law's power outside springs, dashpots and constants, below which it is none."""
 _MODEST = 0.05
 """Size of a law to begin with where the record does not tell one, as a share of the elastic force."""
 
 
 class Placed(NamedTuple):
-    """A term, and the share that it explains of the power that springs and dashpots leave of a missing force."""
+    """A term, and the share that it explains of the power that springs and dashpots leave of a missing force.
+
+    None where constants, springs and dashpots make the same force, so that regression cannot tell.
+    """
 
     term: AbstractTerm
-    share: float
+    share: float | None
 
 
 def scale_of(nuisances: Nuisances, structure: Structure) -> Scale:
@@ -135,22 +140,27 @@ def place(
 
     `sign` asks for that sign of the first number; a side stays as it is unless `sides` are to be tried.
     """
-    kind, n, dof = type(law), len(latent.force), structure.dof
+    kind, n = type(law), len(latent.force)
     time = jnp.asarray(nuisances.record.time[:n])
     motion = (jnp.asarray(latent.displacement), jnp.asarray(latent.velocity), time)
-    spread = np.maximum(latent.force.std(0), 1e-300)
+    # At rest friction is anything within its limits, and all else is noise.
+    moves = latent.moves if np.any(latent.moves) else np.ones(n, bool)
+    missing = latent.force[moves]
+    spread = np.maximum(missing.std(0), 1e-300)
     rows = _numbers(law, scale, sides)
     forces = np.concatenate([_forces(law, lot, structure, motion, len(chunk)) for chunk, lot in _lots(kind, rows)])
     beside = [np.asarray(force_along(lower(Structure(structure.mass, [t])), *motion)) for t in others]
     stable = np.max(np.abs(forces), (1, 2)) < _RUN_AWAY * np.max(spread)  # false for what is no number, too
-    forces, rows = forces[stable], list(compress(rows, stable))
+    forces, rows = forces[stable][:, moves], list(compress(rows, stable))
     if not rows:
         return []
     basis, doubt = _basis(latent, structure, beside)
-    basis = basis / np.tile(spread, n)[:, None]
-    wanted = (latent.force / spread).ravel()
-    columns = (forces / spread).reshape(len(rows), n * dof)
-    left, beside_all, _, _ = _regressed(columns, wanted, basis)
+    basis = (basis[moves] / spread[:, None]).reshape(-1, len(doubt))
+    wanted = (missing / spread).ravel()
+    columns = (forces / spread).reshape(len(rows), -1)
+    left, beside_all, _, own = _regressed(columns, wanted, basis)
+    if np.all(np.sum(own**2, 1) < _ALMOST_NONE * np.sum(columns**2, 1)):
+        return [Placed(law, None)]
     # Springs and dashpots are known to some extent: without that, a law that is partly linear has no size of its own.
     noise = np.sqrt(_CORRELATED * max(np.min(left @ left - beside_all), 1e-12 * wanted.size) / wanted.size)
     ridge = np.diag(noise / doubt)
@@ -229,7 +239,7 @@ def _regressed(columns: np.ndarray, wanted: np.ndarray, basis: np.ndarray):
 
 
 def _basis(latent: Latent, structure: Structure, beside: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Columns (n·dof, columns) of what may be off besides, and how far: springs, dashpots, constants; given forces."""
+    """Forces (n, dof, columns) of what may be off besides, and how far: springs, dashpots, constants; given forces."""
     n, dof = latent.force.shape
     columns, doubt = list(beside), [1.0] * len(beside)
     for term in structure.terms:
@@ -241,4 +251,4 @@ def _basis(latent: Latent, structure: Structure, beside: Sequence[np.ndarray]) -
     for j in range(dof):
         columns.append(np.ones((n, 1)) * (np.arange(dof) == j) * np.std(latent.force))
         doubt.append(_CONSTANT)
-    return np.stack([c.ravel() for c in columns], 1), np.array(doubt)
+    return np.stack(columns, 2), np.array(doubt)

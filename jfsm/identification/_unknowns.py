@@ -20,7 +20,9 @@ DEGREES_BESIDE = 4.0
 TYPICAL, TYPICAL_SPREAD = 0.15, 1.5
 """An effect's size as a share of the elastic force, and the spread of its logarithm."""
 _SHAPE_SPREAD = 1.0
-_OFFSET = 0.1
+_OFFSET, _SLIGHT = 0.1, 0.01
+"""Offset of a channel, as a share of its spread: a nuisance, no more. That of a force or an acceleration is believed to
+be slight, for a larger one is a cause: a constant force, or an accelerometer's bias."""
 _START_SPREAD = 3.0
 """Doubt about the initial state, in sizes of the motion: a model that lacks something may guess it badly."""
 _SCALE_SPREAD, _SCALE_SPREAD_GUESSED = 0.5, 3.0
@@ -135,7 +137,7 @@ def nuisance_unknowns(structure: Structure, nuisances: Nuisances, index: int) ->
     values = structure.values()
     for kind, j in _offset_channels(structure, nuisances):
         size = float(np.std(nuisances.record.channels[(kind, j)]))
-        unit = _OFFSET * size
+        unit = size * (_OFFSET if kind in ("displacement", "velocity") else _SLIGHT)
         path = f"offset@{kind}-{j}.b"
         found.append(Unknown(path, values[path] / unit, unit, False, 0.0, 1.0, record=index))
     if not nuisances.at_rest:

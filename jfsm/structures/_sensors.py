@@ -99,7 +99,7 @@ class AccelerationBias(AbstractSensor):
     at: tuple[str, int] = eqx.field(converter=as_channel, static=True, kw_only=True)
     kind = "accel_bias"
     channels = ("acceleration",)
-    parameters = (Parameter("b", positive=False, meaning="bias of the accelerometer, in its unit"),)
+    parameters = (Parameter("b", length=1, time=-2, positive=False, meaning="bias of the accelerometer"),)
 
 
 class Clipping(AbstractSensor):

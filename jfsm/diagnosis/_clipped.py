@@ -1,0 +1,52 @@
+"""Channels that their recorder limited: seen in the record itself, before anything is fitted."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..records import Record, clipped
+from ..structures import Clipping, Structure, causes
+from ._decide import Decision
+from ._diagnosis import Estimate, Finding
+from ._trial import Trial
+
+PROBABILITY = 0.99
+"""That samples at one level are clipped ones: noise does not come back to a level by itself."""
+_NOTICEABLE = 0.002
+"""Share of a channel's samples, from which clipping is a finding."""
+_SAME = 1e-9
+"""Rounding, relative."""
+
+
+def limited(records: Sequence[Record], model: Structure) -> list[Clipping]:
+    """The clipped channels of which the model knows nothing, with their limits; those cut off alike on both sides."""
+    known = {s.at for s in model.sensors if isinstance(s, Clipping)}
+    found: dict[tuple[str, int], float] = {}
+    for record in records:
+        for channel, samples in record.channels.items():
+            cut = clipped(samples)
+            size = float(np.max(np.abs(samples)))
+            there = np.abs(samples[cut])
+            if channel not in known and cut.mean() > _NOTICEABLE and np.all(there >= size * (1 - _SAME)):
+                found[channel] = max(size, found.get(channel, 0.0))
+    return [Clipping(limit, at=channel) for channel, limit in found.items()]
+
+
+def beside_clipping(decision: Decision, sensors: Sequence[Clipping], refitted: Trial) -> Decision:
+    """A decision once channels are known to be clipped.
+
+    A clipped force drives with peaks that are guessed: what they leave is no effect of its own.
+    """
+    if decision.verdict in ("consistent", "parameters"):
+        return replace(decision, verdict="cause")
+    if decision.verdict != "cause" and any(sensor.at[0] == "force" for sensor in sensors):
+        return replace(decision, verdict="cause", winner=refitted)
+    return decision
+
+
+def finding(sensor: Clipping, unit: str) -> Finding:
+    """A clipped channel as a finding."""
+    limit, cause = sensor.value, causes()["clipping"]
+    estimate = Estimate(limit, limit * (1 - _SAME), limit * (1 + _SAME), unit)
+    return Finding(cause.id, cause.family, sensor.at, PROBABILITY, {"limit": estimate}, (), cause.sentence)
