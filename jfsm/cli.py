@@ -99,6 +99,9 @@ class RecordFile:
     at_rest: Annotated[
         bool, typer.Option("--at-rest", help="At rest at the first sample.", rich_help_panel=_CHANNELS)
     ] = False
+    drive: Annotated[
+        str | None, _option("What is imposed: force, or motion (a component on a rig).", "force|motion", _CHANNELS)
+    ] = None
 
     def read(self) -> "Record":
         """The record in the file."""
@@ -117,6 +120,7 @@ class RecordFile:
                 units=_units(self.unit),
                 where=_where(self.where),
                 at_rest=self.at_rest or None,  # without the option, what the file says
+                drive=self.drive,  # pyright: ignore[reportArgumentType]  # refused there unless it is one of the two
             )
         except TypeError as error:  # from what the file holds; a TypeError of any later step is a mistake of ours
             raise ValueError(f"{self.record}: {error}") from error
@@ -159,7 +163,10 @@ def simulate(
     model: ModelFile,
     out: Annotated[Path, _option("Write the motion here, as a csv, txt, npz or mat file.")],
 ) -> None:
-    """Run a model freely under the force of a record, and write its motion as a record."""
+    """Run a model freely under the force of a record, and write its motion as a record.
+
+    With --drive motion, the force that the record's motion needs.
+    """
     from .dynamics import simulate
     from .records import Record
 
@@ -172,16 +179,18 @@ def simulate(
     forces = {dof: samples for (kind, dof), samples in record.channels.items() if kind == "force"}
     Record(
         response.time,
-        force=forces or None,
+        force=(forces or None) if response.force is None else response.force,
         displacement=response.displacement,
         velocity=response.velocity,
         acceleration=response.acceleration,
         base_acceleration=record.base_acceleration,
         units=record.units,
         at_rest=record.at_rest,
+        drive=record.drive,
         name=f"{record.name}, simulated",
     ).write(out)
-    typer.echo(f"The motion of {len(response.time)} samples is in {out}.")
+    what = "motion" if response.force is None else "force of the motion"
+    typer.echo(f"The {what} of {len(response.time)} samples is in {out}.")
 
 
 @command

@@ -158,7 +158,7 @@ def test_faults_of_the_measuring_chain_and_a_constant_force_are_named(cause, at,
         assert 0.01 < np.mean(np.abs(read[at[0]]) == truth) < 0.2
     elif cause == "channel_delay":
         read["displacement"] = np.concatenate([np.zeros(3), read["displacement"][:-3]])
-    again = jfsm.Record(record.time, **read, at_rest=True)
+    again = jfsm.Record(record.time, **read, at_rest=True)  # pyright: ignore[reportArgumentType]
     d = jfsm.diagnose(again, right, causes=FAULTS, key=jax.random.key(0))
     assert (d.verdict, d.findings[0].cause, d.findings[0].at) == ("cause", cause, at)
     assert d.findings[0].parameters[name].value == pytest.approx(truth, rel=0.1)

@@ -440,7 +440,7 @@ def test_the_response_of_a_record_at_rest_has_no_part_in_its_run():
     [
         (MODEL, jfsm.Record(TIME, {2: FORCE}), {}, "`record` names degree of freedom 2; the structure has 1"),
         (jfsm.Structure([0.0]), RECORD, {}, r"`mass` must be positive for the structure to move; got \[0\.0\]"),
-        (MODEL, jfsm.Record(TIME, FORCE, drive="motion"), {}, '`record` has drive="motion"; an imposed motion'),
+        (MODEL, jfsm.Record(TIME, FORCE, drive="motion"), {}, '`record` has drive="motion", so it must hold the disp'),
         (jfsm.Structure.sdof(1.0, 1e8), RECORD, {}, r"`model` must move slowly enough .* fastest mode .* 10000 rad/s"),
         (
             jfsm.Structure.sdof(1.0, 1.0, 1e3),

@@ -23,7 +23,17 @@ from ..identification import (
     scale_of,
     with_offsets,
 )
-from ..structures import AccelerationBias, Cause, Structure, causes
+from ..structures import (
+    AccelerationBias,
+    AccelerationGain,
+    Cause,
+    ChannelDelay,
+    CoulombAsymmetric,
+    ForceGain,
+    Preload,
+    Structure,
+    causes,
+)
 
 _START, _START_AT_PEAK = 0.1, 0.3
 """First guess of an effect as a share of the elastic force, in the mean and at the largest displacement.
@@ -38,6 +48,10 @@ _SHAPES = 2
 """Starts of a law."""
 _FOLLOWED = 8
 """Laws that are fitted, the most promising ones."""
+_NOT_BESIDE_A_MOTION = (ForceGain, ChannelDelay, AccelerationBias, AccelerationGain, Preload, CoulombAsymmetric)
+"""Effects that an imposed motion does not show: a gain of the force is that of all own values, a constant force its
+offset, asymmetric friction friction beside an offset, a late motion an early force, and what is wrong with an
+accelerometer shows beside the displacement."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,12 +97,15 @@ def candidates(
     places: Sequence[tuple] | None = None,
 ) -> list[Candidate]:
     """Every cause of `selection` at every place: link laws on the model's links, sensor effects on the channels."""
-    found, laws = [], _Laws(model, records[0])
+    found, laws, imposed = [], _Laws(model, records[0]), records[0].path is not None
     for cause in selection.values():
         if not any(p.free for p in cause.effect.parameters):
             continue  # nothing to fit: a clipped channel shows by itself
+        if imposed and cause.effect in _NOT_BESIDE_A_MOTION:
+            continue
         if cause.is_sensor:
-            kinds = [kind for kind in cause.effect.channels if _shows(cause.effect, kind, records)]
+            channels = ("force",) if imposed else cause.effect.channels
+            kinds = [kind for kind in channels if imposed or _shows(cause.effect, kind, records)]
             spots = dict.fromkeys(c for n in records for c in n.record.channels if c[0] in kinds)
             found += [Candidate(cause, at, _natural_starts(model, cause, at, records[0])) for at in spots]
         else:
@@ -127,13 +144,8 @@ class _Laws:
 def _shows(effect: type, kind: str, records: Sequence[Nuisances]) -> bool:
     """Whether anything but the channels of this kind tells how large and how late they are; a bias needs none."""
     if kind == "force":
-        return any(driven(n) for n in records)
-    return effect is AccelerationBias or any(driven(n) or any(c[0] != kind for c in n.channels) for n in records)
-
-
-def driven(nuisances: Nuisances) -> bool:
-    """Whether a measured force or a moving base drives the record."""
-    return bool(nuisances.fine.force.any() or nuisances.fine.base.any())
+        return any(n.driven for n in records)
+    return effect is AccelerationBias or any(n.driven or any(c[0] != kind for c in n.channels) for n in records)
 
 
 def _natural_starts(model: Structure, cause: Cause, at: tuple, nuisances: Nuisances) -> tuple[Structure, ...]:
@@ -155,9 +167,10 @@ def _natural_starts(model: Structure, cause: Cause, at: tuple, nuisances: Nuisan
 def own_paths(model: Structure, records: Sequence[Nuisances]) -> tuple[str, ...]:
     """The model's own values that a refit may change.
 
-    Without any force only ratios show, so masses stay as stated. Values of zero have nothing to be relative to.
+    Without any force only ratios show, so masses stay as stated; so they do where a motion is imposed that needs hardly
+    any force for them. Values of zero have nothing to be relative to.
     """
-    scaled = any(driven(n) for n in records)
+    scaled = any(n.weighs(model) for n in records)
     values = model.values()
     free = [p for p, (what, _) in model.entries().items() if what.free and values[p] != 0]
     return tuple(p for p in free if scaled or not p.startswith("mass@"))

@@ -24,6 +24,8 @@ _NOTICEABLE = 0.1
 """Excess, as a share of the power that noise leaves, from which a set says anything about an effect."""
 _NEARLY_ALL, _MUCH = 0.8, 0.1
 """A law that explains less than this share of the excess and leaves more than this share of the signal is near."""
+_ALMOST_ALL = 0.95
+"""A law that explains this share of the excess along an imposed motion stands, whatever a map makes of the rest."""
 _WHITE = 0.1
 _SCALE = 0.5
 _LOOKS = (10.0, 40.0)
@@ -80,11 +82,18 @@ def probabilities(trials: Sequence[Trial], periods: float) -> np.ndarray:
 
 
 def decide(
-    given: Trial, refitted: Trial, tried: Sequence[Trial], stand_in: Callable[[Trial], Trial | None], periods: float
+    given: Trial,
+    refitted: Trial,
+    tried: Sequence[Trial],
+    stand_in: Callable[[Trial], Trial | None],
+    periods: float,
+    *,
+    imposed: bool = False,
 ) -> Decision:
     """Verdict over the model as given, the model refitted, every candidate, and a map that stands for any law.
 
-    `stand_in` adds to a trial the map of what it leaves; it is asked only where the winner leaves something.
+    `stand_in` adds to a trial the map of what it leaves; it is asked only where the winner leaves something. Along an
+    `imposed` motion a map repeats even the small faults of a law, one by one, as often as the motion repeats itself.
     """
     kappa, why = {}, {}
     passing = []
@@ -100,7 +109,8 @@ def decide(
     for t in passing:
         if t is not winner:
             why[id(t)] = "explains it too, but is less probable"
-    mapped = None if adequate(winner) else stand_in(winner)
+    stands = imposed and winner.cause is not None and _almost_all(winner, refitted)
+    mapped = None if adequate(winner) or stands else stand_in(winner)
     verdict = _verdict(given, refitted, winner, tried, mapped)
     if verdict == "cause" and chance[id(winner)] < 0.5:
         families = [
@@ -121,6 +131,10 @@ def decide(
     elif verdict == "undecided" and winner.cause is not None:
         winner = refitted
     return Decision(verdict, winner, chance, kappa, why)
+
+
+def _almost_all(t: Trial, refitted: Trial) -> bool:
+    return explained(t, refitted) >= _ALMOST_ALL and t.prediction.left < _MUCH
 
 
 def _reason(t: Trial, given: Trial, refitted: Trial) -> str:

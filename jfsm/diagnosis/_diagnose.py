@@ -9,7 +9,7 @@ import numpy as np
 
 from .._types import require_x64
 from ..dynamics import Reconstruction
-from ..identification import Nuisances, prepare
+from ..identification import Nuisances, prepare_all
 from ..records import Record
 from ..structures import Cause, Structure
 from ._candidates import candidates, chosen_causes, promising
@@ -39,6 +39,9 @@ def diagnose(
     progress: Progress | None = None,
 ) -> Diagnosis:
     """What `model` gets wrong about `record`, the name of the cause, and the gain of mending it.
+
+    Where the motion is imposed (``drive="motion"``) it is judged by the force that was measured. Of the sensors' faults
+    only a late force is looked for then: a gain of the force is that of all own values.
 
     Parameters
     ----------
@@ -83,7 +86,7 @@ def diagnose(
     stated = model
     for sensor in clipped:
         model = model + sensor
-    records = [prepare(r, model, reconstruction) for r in whole]
+    records = prepare_all(whole, model, reconstruction)
     tried, left_out = promising(candidates(model, records, chosen, places))
     steps = _Steps(progress, 4)
 
@@ -93,13 +96,14 @@ def diagnose(
     refitted = fit_model("refitted", model, records, until, refit=True)
     if _outweighed(model, refitted.structure):
         # The noise of the force acts through the mass, and all hypotheses share one noise: that of the likelier mass.
-        records = [prepare(r, model, reconstruction, weighed=refitted.structure) for r in whole]
+        records = prepare_all(whole, model, reconstruction, weighed=refitted.structure)
         given = fit_model("given", model, records, until, refit=False)
         refitted = fit_model("refitted", model, records, until, refit=True)
     trials = search(tried, model, given, refitted, records, until, steps.next)
     steps.next("the missing force")
     periods = sum(n.record.duration for n in records) * records[0].omega / (2 * math.pi)
-    decision = decide(given, refitted, trials, lambda t: stand_in(t, records, until), periods)
+    imposed = records[0].path is not None
+    decision = decide(given, refitted, trials, lambda t: stand_in(t, records, until), periods, imposed=imposed)
     if clipped:
         decision = beside_clipping(decision, clipped, refitted)
     extended = model if decision.verdict == "consistent" else decision.winner.extended()

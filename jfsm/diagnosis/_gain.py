@@ -1,4 +1,4 @@
-"""What mending the model is worth: free runs on readings that took no part."""
+"""What mending the model is worth: free runs, or forces of an imposed motion, on readings that took no part."""
 
 import math
 from collections.abc import Mapping
@@ -14,6 +14,8 @@ from ..structures import Structure
 
 _PERIODS = 2.0
 """Periods, at least, from which the state of a held-out run is estimated; they are not counted."""
+_END = 20
+"""One in so many samples of an imposed motion is its end."""
 _CLOSABLE = 1.05
 """Error before, in floors, from which there is anything to close."""
 _DRAWS = 4
@@ -87,13 +89,13 @@ def measure_gain(
     curves = []
     for record in records:
         window = window_for(record, omega)
+        counted = _counted(record, window)
         runs = {
             name: _run(model, record, window, reconstruction)
             for name, model in (("before", given), ("refitted", refitted), ("after", extended))
         }
         left = _noise(extended, record, window, reconstruction, runs["after"], noise, seed)
-        for channel, y in record.responses.items():
-            counted = slice(window, None)
+        for channel, y in record.answers.items():
             for name, run in runs.items():
                 squares[name].setdefault(channel, []).append(float(np.mean((run[channel][counted] - y[counted]) ** 2)))
             squares["floor"].setdefault(channel, []).append(left[channel])
@@ -114,20 +116,23 @@ def measure_gain(
     return Gain(**total, channels=channels), curves
 
 
-def _run(
-    model: Structure, record: Record, window: int, reconstruction: Reconstruction, state=None
-) -> dict[tuple, np.ndarray]:
-    response = simulate(model, record, state, window=window, reconstruction=reconstruction, solver="grid")
+def _run(model: Structure, record: Record, window: int, reconstruction: Reconstruction) -> dict[tuple, np.ndarray]:
+    response = simulate(model, record, window=window, reconstruction=reconstruction, solver="grid")
     shown = response.readings(record)
     # A run that escaped counts as one that stays at its last value: bad, and finite.
     return {c: np.concatenate([y, np.full(len(record) - y.size, y[-1] if y.size else 0.0)]) for c, y in shown.items()}
+
+
+def _counted(record: Record, window: int) -> slice:
+    """Samples on which a gain is measured; of an imposed motion not the last ones, where its rate is hardly known."""
+    return slice(window, len(record) - len(record) // _END if record.drive == "motion" else None)
 
 
 def _noise(
     model, record: Record, window: int, reconstruction, run, levels: Mapping[tuple, float], rng
 ) -> dict[tuple, float]:
     """Mean square error that noise alone leaves, per channel: its readings', its drive's and its start's."""
-    total = {c: 0.0 for c in record.responses}
+    total = {c: 0.0 for c in record.answers}
     for _ in range(_DRAWS):
         # The extended model's own run stands for the truth; fresh noise on what was measured, and all steps again.
         noisy = {
@@ -136,7 +141,7 @@ def _noise(
         }
         again = _run(model, _like(record, noisy), window, reconstruction)
         for c in total:
-            total[c] += float(np.mean((again[c] - run[c])[window:] ** 2)) / _DRAWS
+            total[c] += float(np.mean((again[c] - run[c])[_counted(record, window)] ** 2)) / _DRAWS
     return {c: total[c] + levels.get(c, 0.0) ** 2 for c in total}
 
 

@@ -52,7 +52,7 @@ def assemble(
     notes = tuple(dict.fromkeys(note for n in records for note in n.notes))
     noise = {f"{kind} {j}": float(s) for n in records[:1] for (kind, j), s in zip(n.channels, n.floor, strict=True)}
     smallest = _detectable(trials, model, units)
-    sentence, advice = _words(decision, findings, gain)
+    sentence, advice = _words(decision, findings, gain, imposed=records[0].path is not None)
     data = {
         "jfsm": _version(),
         "verdict": decision.verdict,
@@ -172,11 +172,12 @@ def _passed_over(c: Candidate) -> CandidateResult:
     return CandidateResult(c.cause.id, c.at, -math.inf, {}, share, 0.0, {}, why)
 
 
-def _words(decision: Decision, findings: tuple[Finding, ...], gain: Gain | None) -> tuple[str, str]:
+def _words(decision: Decision, findings: tuple[Finding, ...], gain: Gain | None, *, imposed: bool) -> tuple[str, str]:
+    error = "error of the predicted force" if imposed else "free-run error"
     share = (
         ""
         if gain is None
-        else f" The free-run error on held-out readings goes from {gain.before:.2%} to {gain.after:.2%} of the signal."
+        else f" The {error} on held-out readings goes from {gain.before:.2%} to {gain.after:.2%} of the signal."
     )
     if decision.verdict == "consistent":
         return "The record shows nothing beyond noise that the model lacks.", "Keep the model as it is."
@@ -193,9 +194,10 @@ def _words(decision: Decision, findings: tuple[Finding, ...], gain: Gain | None)
             f"A real effect is there that no catalogue entry explains; a map stands in.{share}",
             "Look at the map's shape; record a second run with another amplitude.",
         )
+    more = "measure the velocity beside the displacement" if imposed else "measure the missing channels"
     return (
         "Something is wrong beyond noise, and this record cannot tell what.",
-        "Record a second run with another amplitude, or measure the missing channels.",
+        f"Record a second run with another amplitude, or {more}.",
     )
 
 
@@ -244,7 +246,7 @@ def _holdout(runs: list[dict]) -> dict[str, Any] | None:
             "before": _list(before[c][take]),
             "after": _list(after[c][take]),
         }
-        for c, y in record.responses.items()
+        for c, y in record.answers.items()
     }
     return {"time": _list(record.time[take]), "channels": channels}
 

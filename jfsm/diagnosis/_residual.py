@@ -8,9 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from .._types import evenly_taken
-from ..dynamics._plant import direction, lower
-from ..estimation import latent_force
-from ..identification import Hypothesis, Nuisances, Posterior
+from ..dynamics._plant import direction
+from ..identification import Hypothesis, Nuisances, Posterior, missing_force
 from ..structures import AbstractTerm, Structure
 from ..surrogates import RKPM, HermiteTable, tabulate
 from ._trial import Trial, predict
@@ -38,13 +37,8 @@ def residual(structure: Structure, nuisances: Nuisances, until: int, at: tuple[i
 
     Without `at` it is the link that carries most of it.
     """
-    plant = lower(structure, nuisances.channels)
     n = nuisances.samples
-    readings, fine = nuisances.readings, nuisances.fine
-    found = latent_force(
-        plant, nuisances.show, fine, np.asarray(readings.values)[:n], np.asarray(readings.use)[:n],
-        readings.variance, nuisances.force_variance, nuisances.omega, nuisances.length,
-    )  # fmt: skip
+    found = missing_force(structure, nuisances, n)
     links = list(structure.links)
     rows = np.array([direction(link, structure.dof) for link in links])
     # Forces on degrees of freedom as forces on links: exact for a chain, least squares otherwise.

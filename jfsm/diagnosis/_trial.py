@@ -77,9 +77,7 @@ class Trial:
 
     def extended(self) -> Structure:
         """The structure without the offsets that are not significant."""
-        return without_small_offsets(
-            self.structure, self.unknowns, self.theta, np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        )
+        return without_small_offsets(self.structure, self.unknowns, self.theta, self.covariance)
 
     def interval(self, path: str, width: float = 1.96) -> tuple[float, float, float]:
         """Value, low and high of an unknown; symmetric in its own coordinate."""
@@ -127,7 +125,9 @@ def predict(posterior: Posterior, theta: np.ndarray) -> Prediction:
 
 
 def _windows(nuisances: Nuisances) -> tuple[np.ndarray, np.ndarray]:
-    """Which samples the filter uses, and which it predicts freely."""
+    """Which samples the filter uses, and which it predicts freely: all of them along an imposed motion."""
+    if nuisances.path is not None:
+        return np.zeros((nuisances.samples, len(nuisances.channels))), np.ones(nuisances.samples, bool)
     n, period = nuisances.samples, 2 * np.pi / (nuisances.omega * nuisances.record.dt)
     period = min(period, n / (2 * (_FILTERED + _PREDICTED)))
     phase = np.arange(n) % max(int(round((_FILTERED + _PREDICTED) * period)), 2)

@@ -28,6 +28,10 @@ class Fine(eqx.Module):
     def substeps(self) -> int:
         return (self.force.shape[1] - 1) // 2
 
+    def head(self, n: int) -> "Fine":
+        """What drives the first `n` samples."""
+        return Fine(self.force[:n], self.base[:n], self.time[:n], self.step)
+
 
 def punctual(plant: Plant, fine: Fine) -> Fine:
     """What drives a run with the delay of its force sensor undone: the force of t is what is read at t + tau."""
@@ -35,10 +39,10 @@ def punctual(plant: Plant, fine: Fine) -> Fine:
         return fine
     n, halves, dof = fine.force.shape
     flat = jnp.concatenate([fine.force[:, :-1].reshape(n * (halves - 1), dof), fine.force[-1:, -1]])
-    columns = [_shifted(flat[:, j], plant.force_delay[j] / fine.step * (halves - 1)) for j in range(dof)]
-    shifted = jnp.stack(columns, 1)
+    columns = [shifted(flat[:, j], plant.force_delay[j] / fine.step * (halves - 1)) for j in range(dof)]
+    later = jnp.stack(columns, 1)
     take = jnp.arange(n)[:, None] * (halves - 1) + jnp.arange(halves)[None, :]
-    return Fine(shifted[take], fine.base, fine.time, fine.step)
+    return Fine(later[take], fine.base, fine.time, fine.step)
 
 
 def drive_before(fine: Fine, tau: Float[Array, ""]) -> tuple[Float[Array, "n 5 dof"], Float[Array, "n 5"]]:
@@ -47,11 +51,11 @@ def drive_before(fine: Fine, tau: Float[Array, ""]) -> tuple[Float[Array, "n 5 d
     rows = jnp.concatenate([fine.force, fine.base[..., None]], 2)
     flat = jnp.concatenate([rows[:, :-1].reshape(n * (halves - 1), dof + 1), rows[-1:, -1]])
     places = -tau / fine.step * (halves - 1) * jnp.linspace(0.0, 1.0, 5)
-    earlier = jax.vmap(jax.vmap(_shifted, (1, None), 1), (None, 0), 1)(flat, places)[: n * (halves - 1) : halves - 1]
+    earlier = jax.vmap(jax.vmap(shifted, (1, None), 1), (None, 0), 1)(flat, places)[: n * (halves - 1) : halves - 1]
     return earlier[..., :dof], earlier[..., dof]
 
 
-def _shifted(values: Float[Array, " n"], places: Float[Array, ""]) -> Float[Array, " n"]:
+def shifted(values: Float[Array, " n"], places: Float[Array, ""]) -> Float[Array, " n"]:
     """Values so many places further on, by the cubic through four neighbours."""
     whole = jax.lax.stop_gradient(jnp.floor(places))
     s = places - whole
@@ -141,7 +145,8 @@ def delayed_along(plant: Plant, x, v, time) -> Float[Array, "n dof"]:
         early = (place < 0)[:, None]
         k = jnp.clip(jnp.floor(place).astype(int), 0, n - 2)
         s = jnp.clip(place - k, 0.0, 1.0)[:, None]
-        moved = jnp.where(early, x[:1], x[k] + s * (x[k + 1] - x[k]))
+        bent = (1.0 - s) * v[k] - s * v[k + 1] - (1.0 - 2.0 * s) * (x[k + 1] - x[k]) / step  # cubic Hermite
+        moved = jnp.where(early, x[:1], x[k] + s * (x[k + 1] - x[k]) + s * (1.0 - s) * step * bent)
         speed = jnp.where(early, 0.0, v[k] + s * (v[k + 1] - v[k]))
         d, w = (jnp.sum(slots.direction[i][None, :] * q, 1) for q in (moved, speed))
         force = _late_force(plant, i, d, w, time)

@@ -1,4 +1,4 @@
-"""Free runs of a structure, driven by what a record says drove it."""
+"""Free runs of a structure, driven by what a record says drove it; the force that a motion needs, where that drove."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,6 +19,8 @@ from ..structures import (
     AccelerationGain,
     ChannelDelay,
     Clipping,
+    ForceDelay,
+    ForceGain,
     MapTerm,
     Offset,
     Structure,
@@ -27,7 +29,9 @@ from ..surrogates import AbstractForceStateMap, tabulate
 from ._drive import Reconstruction
 from ._excitation import bucket, excitation, force_limits, measured_force, substeps_for, typical_speed
 from ._grid import Fine, punctual, run_grid, true_force
-from ._plant import Grid, Plant, lower
+from ._imposed import imposed_motion, imposed_substeps
+from ._needed import force_needed
+from ._plant import Grid, Plant, lower, readout
 from ._reference import run_reference
 from ._start import starting_state
 from ._stepper import free_acceleration, inverse_mass
@@ -42,7 +46,7 @@ _BOUND = 1e6
 
 @dataclass(frozen=True)
 class Response:
-    """Motion of a free run, in the record's datum.
+    """Motion of a free run, in the record's datum; or an imposed motion, and the force that it needs.
 
     Attributes
     ----------
@@ -57,6 +61,9 @@ class Response:
         Instant [s] at which the motion left every bound; the state there is the last of the arrays.
     solver : str
         ``"reference"`` or ``"grid"``, whichever the motion comes from.
+    force : (n, dof) array or None
+        Where the motion is imposed: the force that it needs, offset of its channel included. The motion is then the
+        record's own, as reconstructed.
     """
 
     time: np.ndarray
@@ -67,20 +74,25 @@ class Response:
     escape_time: float | None
     solver: str
     _sensors: tuple[AbstractSensor, ...]
+    force: np.ndarray | None = None
 
     def readings(self, record: Record) -> dict[tuple[str, int], np.ndarray]:
-        """What the sensors of `record` would show, by channel (kind, degree of freedom): their effects applied."""
+        """What the sensors of `record` would show, by channel (kind, degree of freedom): their effects applied.
+
+        It is the channels of the response; where the motion is imposed, those of the force.
+        """
         found = {}
-        for key in record.responses:
+        for key in record.answers:
             offset = total(self._sensors, Offset, key)
             y = (
                 getattr(self, key[0])[:, key[1] - 1] - offset
             )  # gain and delay act on the motion, the offset comes after
-            late = total(self._sensors, ChannelDelay, key)
+            late = total(self._sensors, ChannelDelay, key) + total(self._sensors, ForceDelay, key)
             if late and y.size > 3:
                 y = CubicSpline(self.time, y)(np.clip(self.time - late, self.time[0], self.time[-1]))
             bias = total(self._sensors, AccelerationBias, key)
-            y = (1.0 + total(self._sensors, AccelerationGain, key)) * y + offset + bias
+            gain = total(self._sensors, AccelerationGain, key) + total(self._sensors, ForceGain, key)
+            y = (1.0 + gain) * y + offset + bias
             limits = [s.value for s in self._sensors if isinstance(s, Clipping) and s.at == key]
             found[key] = np.clip(y, -min(limits), min(limits)) if limits else y
         return found
@@ -96,7 +108,13 @@ def simulate(
     solver: Literal["reference", "grid"] = "reference",
     tolerance: float = 1e-10,
 ) -> Response:
-    """Free run of `model` under the force (or base motion) of `record`.
+    """Free run of `model` under the force (or base motion) of `record`, or the force that its imposed motion needs.
+
+    With ``drive="motion"`` nothing is free: `Response.force` is the force that moves the structure as the record says,
+    its inertia included; masses may be 0. Between its samples the motion is one quintic spline through all channels of
+    a degree of freedom, its knots chosen by cross-validation. Hidden states are integrated along it, relaxed at the
+    start; friction slides with the sign of the speed, and where that is smaller than its error, lies between both
+    sides. `initial_state`, `window`, `reconstruction`, `solver` and `tolerance` mean nothing then.
 
     Parameters
     ----------
@@ -125,11 +143,18 @@ def simulate(
     ------
     ValueError
         If the record names a degree of freedom that the structure lacks, its time is uneven, a mass is zero, or
-        `initial_state` has the wrong shape.
+        `initial_state` has the wrong shape; or, where the motion is imposed, it is not measured at a degree of freedom,
+        or an initial state is given.
     """
     require_x64()
-    check_pair(model, record)
+    check_pair(model, record, imposed=True)
     model = with_tables(model)
+    if record.drive == "motion":
+        if initial_state is not None:
+            raise ValueError(
+                '`initial_state` must be left out where the record has drive="motion": its motion is known throughout.'
+            )
+        return _imposed_response(model, record)
     channels = tuple(record.responses)
     exact = lower(model, channels)
     fixed = bool(len(exact.friction) or len(exact.delayed))  # what sticks or answers the past has a scheme of its own
@@ -186,23 +211,40 @@ def with_tables(model: Structure) -> Structure:
     return Structure(model.mass, terms, model.sensors, model.trust)
 
 
-def check_pair(model: Structure, record: Record) -> None:
-    """Refuse a record and a structure that do not belong together."""
+def _imposed_response(model: Structure, record: Record) -> Response:
+    """The motion of a record, and the force that it needs."""
+    path, channels = imposed_motion(record, model), tuple(record.channels)
+    substeps = finer(imposed_substeps(model, record.dt, typical_speed(record)))
+    # Gain and delay of the force's sensor concern readings only.
+    plain = [s for s in model.sensors if not isinstance(s, ForceGain | ForceDelay)]
+    structure = Structure(model.mass, model.terms, plain, model.trust)
+    plant = lower(structure, channels, grid=Grid(record.dt, substeps))
+    force = force_needed(plant, readout(channels, model.dof), path.imposed(substeps, bucket(len(record))))
+    return Response(
+        record.time, *path.motion(record.time), Result.successful, None, "grid", model.sensors,
+        np.asarray(force)[: len(record)],
+    )  # fmt: skip
+
+
+def check_pair(model: Structure, record: Record, *, imposed: bool = False) -> None:
+    """Refuse a record and a structure that do not belong together; `imposed` motions only where they are understood."""
+    if len(record) < 2:
+        raise ValueError(f"`record` must hold at least 2 samples; it has {len(record)}.")
     if record.dofs > model.dof:
         raise ValueError(f"`record` names degree of freedom {record.dofs}; the structure has {model.dof}.")
+    if record.drive == "motion":
+        if imposed:
+            return
+        raise ValueError(
+            '`record` has drive="motion"; here a force or a moving base must drive. `simulate`, `fit` and `diagnose` '
+            'take imposed motions; if the force drives the structure, make the record with drive="force".'
+        )
     masses = np.asarray(model.mass)
     if masses.ndim == 1 and np.any(masses == 0):
         raise ValueError(
             f"`mass` must be positive for the structure to move; got {masses.tolist()}. "
-            "A mass of 0 is for imposed motion only."
+            'A mass of 0 is for imposed motion only: make the record with drive="motion" if that is what it is.'
         )
-    if record.drive == "motion":
-        raise ValueError(
-            '`record` has drive="motion"; an imposed motion cannot be simulated yet, only a force or a moving base. '
-            'If the force drives the structure, make the record with drive="force".'
-        )
-    if len(record) < 2:
-        raise ValueError(f"`record` must hold at least 2 samples; it has {len(record)}.")
 
 
 @eqx.filter_jit

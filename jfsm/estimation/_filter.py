@@ -48,7 +48,7 @@ class Readings(eqx.Module):
 
 
 class ProcessNoise(eqx.Module):
-    """Covariance (dof, dof) that every sample adds to that of the velocity.
+    """Covariance (dof, dof) that every sample adds to that of the velocity; of the force, where motion is imposed.
 
     It is the same for all hypotheses: were it to follow a fitted mass or gain, a wrong hypothesis could buy itself
     noise with it.

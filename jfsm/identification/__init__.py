@@ -10,6 +10,7 @@ from ._maximise import maximise as maximise
 from ._maximise import rungs as rungs
 from ._nuisances import Nuisances as Nuisances
 from ._nuisances import prepare as prepare
+from ._nuisances import prepare_all as prepare_all
 from ._posterior import LANES as LANES
 from ._posterior import Hypothesis as Hypothesis
 from ._posterior import Posterior as Posterior

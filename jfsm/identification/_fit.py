@@ -1,5 +1,6 @@
 """Values of a structure's own numbers from records."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -10,9 +11,9 @@ from .._threads import side_by_side
 from .._types import require_x64
 from ..dynamics import Reconstruction
 from ..records import Record
-from ..structures import Structure
+from ..structures import Offset, Structure
 from ._maximise import Maximum, approach, finish
-from ._nuisances import Nuisances, prepare
+from ._nuisances import Nuisances, prepare_all
 from ._posterior import Hypothesis, Posterior, lanes_of
 from ._starts import natural_starts, starts
 from ._unknowns import Unknown, bounded, free_unknown, nuisance_unknowns, with_offsets
@@ -73,7 +74,8 @@ def fit(
     """Most probable values of a structure's numbers, with intervals.
 
     The likelihood is that of the innovations of an extended Kalman filter driven by the measured force; offsets,
-    initial states and noise scales are found along.
+    initial states and noise scales are found along. Where the motion is imposed it is that of the force readings: what
+    the motion needs, an offset, white noise, and what the noise of the motion makes of the force.
 
     Parameters
     ----------
@@ -99,7 +101,7 @@ def fit(
     records = [record] if isinstance(record, Record) else list(record)
     if not records:
         raise ValueError("`record` must hold at least one record; the sequence is empty.")
-    prepared = [prepare(r, model, reconstruction) for r in records]
+    prepared = prepare_all(records, model, reconstruction)
     free = free_paths(model, prepared, fixed)
     held = {path: value for path, value in model.values().items() if path not in free}
     found = starts(model, prepared[0])
@@ -120,7 +122,7 @@ def fit(
     correlation = covariance / np.maximum(np.outer(error, error), 1e-300)
     pairs = {(free[i], free[j]): float(correlation[i, j]) for i in range(len(free)) for j in range(i)}
     values = {u.path: float(u.value(t)) for u, t in zip(unknowns[: len(free)], theta, strict=False)}
-    kept = without_small_offsets(posterior.structure(theta, lane), unknowns, theta, error)
+    kept = without_small_offsets(posterior.structure(theta, lane), unknowns, theta, covariance)
     noise = {
         f"{kind} {j}": float(f * np.exp(t / 2))
         for (kind, j), f, t in zip(prepared[0].channels, prepared[0].floor, _scales(unknowns, theta), strict=False)
@@ -185,7 +187,7 @@ def _resolved(posterior: Posterior, best: Maximum, lane: int) -> tuple[Posterior
 
 
 def free_paths(model: Structure, records: Sequence[Nuisances], fixed: Sequence[str]) -> tuple[str, ...]:
-    """Paths that a fit may change; masses stay where no force gives the scale."""
+    """Paths that a fit may change; masses stay where no force gives the scale, or no inertia shows."""
     held: set[str] = set()
     for name in [fixed] if isinstance(fixed, str) else fixed:
         paths = model.select(name)
@@ -194,7 +196,7 @@ def free_paths(model: Structure, records: Sequence[Nuisances], fixed: Sequence[s
                 f"`fixed` names {name!r}, which the structure does not have; it has {', '.join(model.values())}."
             )
         held.update(paths)
-    if not any(n.fine.force.any() or n.fine.base.any() for n in records):
+    if not any(n.weighs(model) for n in records):
         held.update(model.select("mass"))
     return tuple(
         p for p, (what, _) in model.entries().items() if p not in held and what.free and not p.startswith("offset@")
@@ -202,18 +204,29 @@ def free_paths(model: Structure, records: Sequence[Nuisances], fixed: Sequence[s
 
 
 def without_small_offsets(
-    structure: Structure, unknowns: Sequence[Unknown], theta: np.ndarray, error: np.ndarray
+    structure: Structure, unknowns: Sequence[Unknown], theta: np.ndarray, covariance: np.ndarray
 ) -> Structure:
     """The structure without the offsets that are not three standard errors from nothing.
 
-    It carries those of the first record that measures the channel, so these decide.
+    It carries those of the first record that measures the channel, so these decide. They go one by one, the least sure
+    first, and those that stay take over its part: a spring ties the offset of a force to that of the displacement, so
+    that neither may be sure before one of them is gone.
     """
-    small: dict[str, bool] = {}
-    for u, t, s in zip(unknowns, theta, error, strict=True):
+    first: dict[str, int] = {}
+    for k, u in enumerate(unknowns):
         if u.path.startswith("offset@"):
-            small.setdefault(u.path, abs(t) < 3 * s)
-    kept = [s for s in structure.sensors if not small.get(f"{s.kind}@{s.place}.b", False)]
-    return Structure(structure.mass, structure.terms, kept, structure.trust)
+            first.setdefault(u.path, k)
+    while first:
+        sure = {path: abs(theta[k]) / math.sqrt(max(covariance[k, k], 1e-300)) for path, k in first.items()}
+        path = min(sure, key=lambda path: sure[path])
+        if sure[path] >= 3:
+            break
+        k = first.pop(path)
+        along = covariance[:, k] / max(covariance[k, k], 1e-300)
+        theta, covariance = theta - along * theta[k], covariance - np.outer(along, covariance[k])
+    kept = [s for s in structure.sensors if not isinstance(s, Offset) or f"{s.kind}@{s.place}.b" in first]
+    values = {path: unknowns[k].value(theta[k]) for path, k in first.items()}
+    return Structure(structure.mass, structure.terms, kept, structure.trust).with_values(values)
 
 
 def _scales(unknowns: Sequence[Unknown], theta: np.ndarray) -> list[float]:

@@ -16,8 +16,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..dynamics._grid import Fine
+from ..dynamics._imposed import Imposed
 from ..dynamics._plant import Plant, Readout
 from ..estimation._filter import Innovations, ProcessNoise, Readings, Start, innovations
+from ..estimation._imposed import force_innovations
 from ._layout import with_vector
 
 _BLOCKS = 64
@@ -34,13 +36,16 @@ class Lanes(eqx.Module):
 
 
 def _run(
-    plant: Plant, lane, theta, show: Readout, fine: Fine, readings: Readings, noise: ProcessNoise, doubt
+    plant: Plant, lane, theta, show: Readout, fine: Fine | Imposed, readings: Readings, noise: ProcessNoise, doubt
 ) -> Innovations:
+    """Innovations of one start: of a filter that a force drives, or of the force readings along an imposed motion."""
     base, rows, unit, log = lane
     value = unit * jnp.where(log > 0, jnp.exp(jnp.where(log > 0, theta, 0.0)), theta)
     numbers = base + jnp.sum(rows * value[:, None], 0)
     dof, channels = plant.dof, readings.values.shape[1]
     tail = numbers[numbers.size - 2 * dof - channels :]
+    if isinstance(fine, Imposed):
+        return force_innovations(with_vector(plant, numbers), show, fine, readings, noise, doubt, tail[2 * dof :])
     start = Start(tail[:dof], tail[dof : 2 * dof], jnp.diag(doubt**2))
     return innovations(with_vector(plant, numbers), show, fine, readings, noise, start, tail[2 * dof :])
 

@@ -17,6 +17,7 @@ from ..dynamics._excitation import (
     typical_speed,
 )
 from ..dynamics._grid import Fine
+from ..dynamics._imposed import Imposed, Path, imposed_motion, imposed_substeps, noise_of
 from ..dynamics._plant import Channel, Readout, lower, readout
 from ..dynamics._simulate import check_pair
 from ..dynamics._start import starting_state
@@ -34,6 +35,7 @@ _FINEST = 2
 """Samples per knot at which a spline's residual holds signal as well."""
 _OVERSAMPLED = 3
 """Samples per knot from which a spline's curve may stand for the force: the band above holds noise only."""
+_MOSTLY = 0.5
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,10 @@ class Nuisances:
     Attributes
     ----------
     channels : tuple of (kind, degree of freedom)
-        Response channels.
+        Response channels. Where the motion is imposed, all of the record: the readings are those of the force, and the
+        motion's channels bring their noise.
+    fine : Fine or Imposed
+        What is imposed: the force (and the base), or the motion.
     spread : (channels,) array
         Standard deviation of each channel's readings.
     force_variance : (dof,) array
@@ -62,7 +67,7 @@ class Nuisances:
     record: Record
     channels: tuple[Channel, ...]
     show: Readout
-    fine: Fine
+    fine: Fine | Imposed
     readings: Readings
     noise: ProcessNoise
     force_variance: np.ndarray
@@ -77,24 +82,51 @@ class Nuisances:
     at_rest: bool
     reconstruction: Reconstruction
     notes: tuple[str, ...]
+    path: Path | None = None
 
     @property
     def samples(self) -> int:
         return len(self.record)
 
-    def head(self, until: int) -> tuple[Fine, Readings]:
-        """Drive and readings cut to the padded length of the first `until` samples."""
-        n, r, f = min(bucket(until), self.fine.time.shape[0]), self.readings, self.fine
-        readings = Readings(r.values[:n], r.use[:n], r.variance, r.valid[:n])
-        return Fine(f.force[:n], f.base[:n], f.time[:n], f.step), readings
+    @property
+    def driven(self) -> bool:
+        """Whether a measured force or a moving base drives the record, so that masses show."""
+        return isinstance(self.fine, Fine) and bool(self.fine.force.any() or self.fine.base.any())
+
+    def weighs(self, structure: Structure) -> bool:
+        """Whether the record tells masses: it is driven, or a motion is imposed whose inertia is more than noise."""
+        if isinstance(self.fine, Fine):
+            return self.driven
+        inertia = np.asarray(self.fine.a)[: self.samples] @ _mass(structure)
+        return bool(np.any(np.std(inertia, axis=0) > min(self.floor[self.judged])))
+
+    @property
+    def judged(self) -> np.ndarray:
+        """Which of the channels a hypothesis has to predict."""
+        return np.array([channel in self.record.answers for channel in self.channels])
+
+    def elastic_force(self, structure: Structure) -> float:
+        """Size of the elastic force, or of the measured one where the motion is imposed."""
+        if isinstance(self.fine, Imposed):
+            return float(np.max(self.spread[self.judged]))
+        return float(np.mean(np.diag(_mass(structure)))) * self.omega**2 * self.length
+
+    def head(self, until: int) -> tuple[Fine | Imposed, Readings]:
+        """What is imposed, and the readings, cut to the padded length of the first `until` samples."""
+        n, r = min(bucket(until), self.fine.time.shape[0]), self.readings
+        return self.fine.head(n), Readings(r.values[:n], r.use[:n], r.variance, r.valid[:n])
 
     def resolving(self, structures: Sequence[Structure]) -> "Nuisances":
         """The same record with steps short enough for all of these structures."""
         record, fine = self.record, self.fine
         speed = typical_speed(record)
-        need = max(substeps_for(structure, record.dt, speed) for structure in structures)
+        steps_for = substeps_for if self.path is None else imposed_substeps
+        need = max(steps_for(structure, record.dt, speed) for structure in structures)
         if need <= fine.substeps:
             return self
+        if self.path is not None:
+            return replace(self, fine=self.path.imposed(need, fine.time.shape[0]))
+        assert isinstance(fine, Fine)
         samples = np.asarray(fine.force)[: self.samples, 0]
         length = fine.time.shape[0]
         finer = excitation(record, samples.shape[1], need, self.reconstruction, length=length, force=samples)
@@ -115,15 +147,19 @@ def prepare(
     Raises
     ------
     ValueError
-        If the record holds no response, is shorter than 32 samples, or does not fit the model.
+        If the record holds nothing to compare with, is shorter than 32 samples, or does not fit the model.
     """
-    check_pair(model, record)
-    if not record.responses:
+    check_pair(model, record, imposed=True)
+    if not record.answers:
         raise ValueError(
             "`record` must hold a response (displacement, velocity or acceleration); it has none to compare with."
+            if record.drive == "force"
+            else '`record` has drive="motion" and must hold the force that was measured; it has none to compare with.'
         )
     if len(record) < 32:
         raise ValueError(f"`record` must hold at least 32 samples to tell noise from motion; it has {len(record)}.")
+    if record.drive == "motion":
+        return _prepare_imposed(record, model, reconstruction)
     channels = tuple(record.responses)
     values = np.column_stack([record.responses[c] for c in channels])
     spread = np.std(values, axis=0)
@@ -134,8 +170,7 @@ def prepare(
     force, force_variance, share, words = _force(record, model)
     omega = fastest_mode(lower(model)) or _rate(values[:, 0], record.dt)
     length, crest = _size(channels, values, spread, omega)
-    masses = np.asarray((weighed or model).mass)
-    mass = np.diag(masses) if masses.ndim == 1 else masses
+    mass = _mass(weighed or model)
     variance = floor**2
     for i, (kind, j) in enumerate(channels):
         if kind == "acceleration":  # an acceleration is predicted with the force's own noise, less what smoothing took
@@ -161,6 +196,82 @@ def prepare(
         reconstruction=reconstruction,
         notes=(*record.notes, *torn, *words),
     )
+
+
+def prepare_all(
+    records: Sequence[Record],
+    model: Structure,
+    reconstruction: Reconstruction = "band-limited",
+    *,
+    weighed: Structure | None = None,
+) -> list[Nuisances]:
+    """`prepare` of several records, in all of which the same drives.
+
+    Raises
+    ------
+    ValueError
+        As `prepare`, or if the motion drives some of the records only.
+    """
+    drives = [record.drive for record in records]
+    if len(set(drives)) > 1:
+        other = drives.index("motion" if drives[0] == "force" else "force")
+        raise ValueError(
+            f"`record` must hold records that agree in drive; number {other + 1} has {drives[other]}, not {drives[0]}. "
+            "Judge them apart."
+        )
+    return [prepare(record, model, reconstruction, weighed=weighed) for record in records]
+
+
+def _prepare_imposed(record: Record, model: Structure, reconstruction: Reconstruction) -> Nuisances:
+    """Nuisances of a record whose motion is imposed: its readings are those of the force."""
+    channels, path = tuple(record.channels), imposed_motion(record, model)
+    values = np.column_stack([record.channels[c] for c in channels])
+    spread, floor, trusted, use = np.std(values, axis=0), *np.zeros((2, len(channels))), np.zeros_like(values)
+    notes = []
+    for i, (kind, j) in enumerate(channels):
+        if spread[i] == 0:
+            raise ValueError(f"`{kind}` {j} is constant; leave a dead channel out of the record.")
+        found = noise_floor(values[:, i], record.dt)
+        trusted[i] = found.spacing > _FINEST
+        floor[i] = max(noise_of(found, spread[i]), _LEAST_NOISE * spread[i])
+        if kind == "force":
+            lost = clipped(values[:, i])
+            # A force that stays at its extremes for most of the time is dry friction, not the end of a range.
+            lost = (lost & (np.mean(lost) < _MOSTLY)) | spikes(values[:, i], floor[i])
+            use[:, i] = ~lost
+            if np.any(lost):
+                notes.append(f"force {j}: {int(lost.sum())} clipped or torn samples take no part.")
+    nearest = [i for i, (kind, _) in enumerate(channels) if kind != "force"][0]
+    omega = _rate(values[:, nearest], record.dt)
+    motion = [values[:, i : i + 1] for i, (kind, _) in enumerate(channels) if kind != "force"]
+    length, crest = _size(channels[nearest:], np.hstack(motion), spread[nearest:], omega)
+    none = np.zeros(model.dof)
+    return Nuisances(
+        record=record,
+        channels=channels,
+        show=readout(channels, model.dof),
+        fine=path.imposed(imposed_substeps(model, record.dt, typical_speed(record)), bucket(len(record))),
+        readings=_padded(values, use, floor**2),
+        noise=ProcessNoise(jnp.zeros((model.dof, model.dof))),
+        force_variance=none[:0],
+        spread=spread,
+        floor=floor,
+        trusted=trusted.astype(bool),
+        length=length,
+        crest=crest,
+        omega=omega,
+        x0=none,
+        v0=none,
+        at_rest=True,
+        reconstruction=reconstruction,
+        notes=(*record.notes, *path.notes, *notes),
+        path=path,
+    )
+
+
+def _mass(structure: Structure) -> np.ndarray:
+    masses = np.asarray(structure.mass)
+    return np.diag(masses) if masses.ndim == 1 else masses
 
 
 def _noise(

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ..dynamics._imposed import Imposed
 from ..dynamics._plant import Grid, Plant, hidden_width, lower
 from ..estimation._filter import Innovations, ProcessNoise
 from ..structures import AbstractFriction, ChannelDelay, ForceDelay, Structure
@@ -229,12 +230,15 @@ def _doubt(plant: Plant, nuisances: Nuisances):
     """Standard deviation of the state at the first sample.
 
     Displacement and velocity are among the unknowns themselves. Hidden states are not: unless the record began at rest
-    they may be anything up to the size of the motion.
+    they may be anything up to the size of the motion. Of an imposed motion it is the share of its own size that what
+    remembers may be off there.
     """
+    share = 0.0 if nuisances.record.at_rest else 1.0
+    if isinstance(nuisances.fine, Imposed):
+        return jnp.asarray(share)
     length, speed = nuisances.length, nuisances.length * nuisances.omega
     known = _KNOWN_START * np.repeat([length, speed], plant.mass.shape[-1])
-    share = 0.0 if nuisances.at_rest else _HIDDEN_START
-    hidden = share * np.resize([length, speed], plant.memory.kind.shape[0] * hidden_width(plant.memory))
+    hidden = share * _HIDDEN_START * np.resize([length, speed], plant.memory.kind.shape[0] * hidden_width(plant.memory))
     return jnp.asarray(np.concatenate([known, hidden]))
 
 
@@ -254,6 +258,9 @@ def replace_use(readings, use):
 
 def slackened(nuisances: Nuisances, share: float) -> ProcessNoise:
     """Process noise that also forgives an unmodelled force of `share` of the elastic force."""
+    if isinstance(nuisances.fine, Imposed):
+        size = share * np.max(nuisances.spread[nuisances.judged])
+        return ProcessNoise(size**2 * jnp.eye(nuisances.fine.a.shape[1]))
     size = share * nuisances.omega**2 * nuisances.length
     noise = nuisances.noise
     forgiven = size**2 / nuisances.omega * nuisances.record.dt

@@ -15,6 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..dynamics._along import force_along
+from ..dynamics._imposed import Imposed
+from ..dynamics._needed import force_needed
 from ..dynamics._plant import Grid, Plant, direction, lower
 from ..estimation import Latent, latent_force
 from ..structures import AbstractTerm, LinearDamping, LinearStiffness, MapTerm, Scale, Structure
@@ -51,28 +53,44 @@ class Placed(NamedTuple):
 
 def scale_of(nuisances: Nuisances, structure: Structure) -> Scale:
     """Sizes of a record's motion."""
-    masses = np.asarray(structure.mass)
-    mass = float(np.mean(masses if masses.ndim == 1 else np.diag(masses)))
-    force, time = mass * nuisances.omega**2 * nuisances.length, nuisances.record.time
-    return Scale(
-        force, nuisances.length, nuisances.crest * nuisances.length, nuisances.omega, float(time[0]), float(time[-1])
-    )
+    length, time = nuisances.length, nuisances.record.time
+    force = nuisances.elastic_force(structure)
+    return Scale(force, length, nuisances.crest * length, nuisances.omega, float(time[0]), float(time[-1]))
 
 
-def missing_force(structure: Structure, nuisances: Nuisances) -> Latent:
-    """Smoothed motion of a record, and the force that a structure lacks to explain it."""
-    n = min(nuisances.samples, _SAMPLES)
+def missing_force(structure: Structure, nuisances: Nuisances, most: int = _SAMPLES) -> Latent:
+    """Smoothed motion of a record, its first `most` samples, and the force that a structure lacks to explain it."""
+    n = min(nuisances.samples, most)
+    plant = lower(structure, nuisances.channels, grid=Grid(nuisances.record.dt, nuisances.fine.substeps))
+    values, use = (np.asarray(q)[:n] for q in (nuisances.readings.values, nuisances.readings.use))
+    if isinstance(nuisances.fine, Imposed):
+        return _measured(plant, nuisances, values, use)
     return latent_force(
-        lower(structure, nuisances.channels, grid=Grid(nuisances.record.dt, nuisances.fine.substeps)),
+        plant,
         nuisances.show,
         nuisances.fine,
-        np.asarray(nuisances.readings.values)[:n],
-        np.asarray(nuisances.readings.use)[:n],
+        values,
+        use,
         np.asarray(nuisances.readings.variance),
         nuisances.force_variance,
         nuisances.omega,
         nuisances.length,
     )
+
+
+def _measured(plant: Plant, nuisances: Nuisances, values: np.ndarray, use: np.ndarray) -> Latent:
+    """The force that a structure lacks along an imposed motion: what was measured, less what the motion needs."""
+    n, imposed = len(values), nuisances.fine
+    assert isinstance(imposed, Imposed)
+    left = np.zeros((n, plant.dof))
+    std = np.zeros_like(left)
+    known = np.asarray(force_needed(plant, nuisances.show, imposed))[:n]
+    for i in np.flatnonzero(nuisances.judged):
+        j, seen = nuisances.channels[i][1] - 1, use[:, i] > 0
+        lacking = (values[:, i] - known[:, j]) / (1.0 + float(plant.force_gain[j]))
+        left[:, j] = np.interp(np.arange(n), np.flatnonzero(seen), lacking[seen])
+        std[:, j] = nuisances.floor[i]
+    return Latent(np.asarray(imposed.x)[:n, 0], np.asarray(imposed.v)[:n, 0], left, std, np.ones(n, bool))
 
 
 def _laws(structure: Structure) -> tuple[AbstractTerm, ...]:

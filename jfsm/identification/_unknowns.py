@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..dynamics._imposed import Imposed
 from ..structures import AccelerationBias, Offset, Preload, Structure
 from ._nuisances import Nuisances
 
@@ -23,6 +24,8 @@ _SHAPE_SPREAD = 1.0
 _OFFSET, _SLIGHT = 0.1, 0.01
 """Offset of a channel, as a share of its spread: a nuisance, no more. That of a force or an acceleration is believed to
 be slight, for a larger one is a cause: a constant force, or an accelerometer's bias."""
+_OFFSET_OF_ANSWER = 3.0
+"""Doubt about the zero of a force that answers an imposed motion: a static load is part of it."""
 _START_SPREAD = 3.0
 """Doubt about the initial state, in sizes of the motion: a model that lacks something may guess it badly."""
 _SCALE_SPREAD, _SCALE_SPREAD_GUESSED = 0.5, 3.0
@@ -59,12 +62,10 @@ class Unknown:
 def natural_size(structure: Structure, path: str, nuisances: Nuisances) -> float:
     """Size of a parameter at which its force equals the elastic force of the motion."""
     parameter = structure.entries()[path][0]
-    masses = np.asarray(structure.mass)
-    mass = float(np.mean(masses if masses.ndim == 1 else np.diag(masses)))
-    force = mass * nuisances.omega**2 * nuisances.length
     if parameter.words:  # its unit holds an exponent that is itself a parameter
         return abs(structure.values()[path]) or 1.0
-    return force**parameter.force * nuisances.length**parameter.length * nuisances.omega**-parameter.time
+    force, length, omega = nuisances.elastic_force(structure), nuisances.length, nuisances.omega
+    return force**parameter.force * length**parameter.length * omega**-parameter.time
 
 
 def own_unknown(structure: Structure, path: str, trust: Mapping[str, float], degrees: float = DEGREES) -> Unknown:
@@ -120,11 +121,10 @@ def with_offsets(structure: Structure, records: Sequence[Nuisances]) -> Structur
 
 
 def _offset_channels(structure: Structure, nuisances: Nuisances) -> list[tuple[str, int]]:
-    forces = [
-        c
-        for c in nuisances.record.channels
-        if c[0] == "force" and np.any(np.asarray(nuisances.fine.force)[:, 0, c[1] - 1])
-    ]
+    if isinstance(nuisances.fine, Imposed):  # of the motion only displacements; the rest follows these
+        return [c for c in nuisances.channels if c[0] in ("force", "displacement")]
+    acting = np.any(np.asarray(nuisances.fine.force)[:, 0], axis=0)
+    forces = [c for c in nuisances.record.channels if c[0] == "force" and acting[c[1] - 1]]
     # A bias is an offset by another name, and so is a constant force beside the measured one.
     known: set[tuple[str, int]] = {s.at for s in structure.sensors if isinstance(s, AccelerationBias)}
     known |= {("force", t.at[1]) for t in structure.terms if isinstance(t, Preload) and t.at[0] == 0}
@@ -138,6 +138,8 @@ def nuisance_unknowns(structure: Structure, nuisances: Nuisances, index: int) ->
     for kind, j in _offset_channels(structure, nuisances):
         size = float(np.std(nuisances.record.channels[(kind, j)]))
         unit = size * (_OFFSET if kind in ("displacement", "velocity") else _SLIGHT)
+        if kind == "force" and nuisances.path is not None:
+            unit = size * _OFFSET_OF_ANSWER
         path = f"offset@{kind}-{j}.b"
         found.append(Unknown(path, values[path] / unit, unit, False, 0.0, 1.0, record=index))
     if not nuisances.at_rest:

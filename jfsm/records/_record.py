@@ -141,6 +141,13 @@ class Record:
         return MappingProxyType({key: samples for key, samples in self.channels.items() if key[0] != "force"})
 
     @property
+    def answers(self) -> Mapping[tuple[str, int], Channel]:
+        """The channels that a simulation has to predict: the responses, or the forces where the motion drives."""
+        if self._drive == "force":
+            return self.responses
+        return MappingProxyType({key: samples for key, samples in self.channels.items() if key[0] == "force"})
+
+    @property
     def units(self) -> Mapping[str, str]:
         """Unit of each kind of channel, also of kinds that were not measured."""
         return self._units

@@ -55,6 +55,11 @@ def plot_diagnosis(d: Mapping[str, Any]) -> Figure:
     return figure
 
 
+def _what_runs(holdout: Mapping[str, Any]) -> str:
+    forces = all(name.split()[0] == "force" for name in holdout["channels"])
+    return "The force that the imposed motion needs," if forces else "Free runs"
+
+
 def _sketches(d: Mapping[str, Any]) -> Iterator[Sketch]:
     checked_verdict(d)
     curves = d.get("curves") or {}
@@ -63,7 +68,7 @@ def _sketches(d: Mapping[str, Any]) -> Iterator[Sketch]:
         yield Sketch(
             "record",
             "The held-out record",
-            "Free runs over data that took no part in the fit; below each, its error." + left_out,
+            f"{_what_runs(holdout)} over data that took no part in the fit; below each, its error." + left_out,
             describe_record(holdout),
             0.4 + 3.6 * len(holdout["channels"]),
             lambda figure: draw_record(figure, holdout),
