@@ -19,7 +19,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.blind_table import Row, exact, said, table  # noqa: E402  (needs the line above when run as a script)
-from tests.blind import CAUSES, FIRST_CAUSES, Challenge, draw  # noqa: E402
+from tests.blind import CAUSES, Challenge, draw  # noqa: E402
 from tests.blind.challenge import CHANNEL_SETS, NOISE_LEVELS  # noqa: E402
 from tests.blind.drives import DRIVES  # noqa: E402
 
@@ -172,7 +172,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--jobs", type=int, default=2, help="processes")
     parser.add_argument("--noise", type=float, nargs="+", default=list(NOISE_LEVELS), help="shares of a channel's rms")
     parser.add_argument(
-        "--causes", nargs="+", default=list(FIRST_CAUSES), choices=CAUSES, metavar="ID", help="any of the catalogue"
+        "--causes", nargs="+", default=list(CAUSES), choices=CAUSES, metavar="ID", help="any of the catalogue"
     )
     parser.add_argument("--channels", nargs="+", default=list(CHANNEL_SETS), choices=list(CHANNEL_SETS))
     parser.add_argument("--excitation", nargs="+", default=list(DRIVES), choices=list(DRIVES))

@@ -120,6 +120,9 @@ def test_a_right_model_is_left_as_it_is():
     assert d.findings == ()
     assert d.gain is None
     assert d.extended.values() == right.values()
+    laws = {"coulomb", "quadratic_damping", "bouc_wen", "maxwell", "delayed_force", "end_stop", "stiffness_drift"}
+    assert laws | {"force_gain", "channel_delay"} <= set(d.detectable)
+    assert 0 < d.detectable["coulomb"].value < 0.1 and d.detectable["coulomb"].unit == "N"
 
 
 def test_a_wrong_stiffness_is_a_parameter_and_no_cause():

@@ -44,6 +44,8 @@ _START_LATE = 0.5
 """Second guess of a delay, in radians of the motion."""
 
 
+_MODEST = 0.02
+"""Size of an effect that nothing speaks for, as a share of the elastic force."""
 _SHAPES = 2
 """Starts of a law."""
 _FOLLOWED = 8
@@ -162,6 +164,15 @@ def _natural_starts(model: Structure, cause: Cause, at: tuple, nuisances: Nuisan
         path = next(p for p in extended.entries() if p not in model.entries())
         structures.append(extended.with_values({path: sign * size * natural_size(extended, path, nuisances)}))
     return tuple(structures)
+
+
+def modest(candidate: Candidate, model: Structure, nuisances: Nuisances) -> Structure:
+    """The model with a small effect of a law, of a natural shape."""
+    cause = candidate.cause
+    shapes = cause.effect.shapes(scale_of(nuisances, model))
+    shape = shapes[len(shapes) // 2]
+    size = {p.name: _MODEST * (cause.sign or 1) if p.force else 1.0 for p in cause.effect.parameters}
+    return model + cause.effect(**{name: size[name] * value for name, value in shape.items()}, at=candidate.at)
 
 
 def own_paths(model: Structure, records: Sequence[Nuisances]) -> tuple[str, ...]:

@@ -15,9 +15,10 @@ from ..structures import Cause, Structure
 from ._candidates import candidates, chosen_causes, promising
 from ._clipped import beside_clipping, limited
 from ._decide import decide
+from ._detectable import also_detectable
 from ._diagnosis import Diagnosis
 from ._gain import measure_gain
-from ._report import assemble
+from ._report import Tested, assemble
 from ._residual import residual, stand_in
 from ._search import fit_model, search
 from ._trial import Trial
@@ -120,7 +121,12 @@ def diagnose(
         gain, runs = measure_gain(
             stated, refitted.extended(), extended, held, noise, first.omega, first.reconstruction, key
         )
-    return assemble(decision, clipped, refitted, trials, left_out, model, extended, records, missing, gain, runs)
+    unseen = []
+    if decision.verdict in ("consistent", "undecided"):  # silence is worth what would have been heard
+        steps.next("what would have been seen")
+        unseen = also_detectable(left_out, model, records, until)
+    tested = Tested(trials, left_out, unseen)
+    return assemble(decision, clipped, refitted, tested, model, extended, records, missing, gain, runs)
 
 
 def _outweighed(model: Structure, refitted: Structure) -> bool:

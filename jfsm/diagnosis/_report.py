@@ -2,7 +2,7 @@
 
 import math
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from ..structures import PARAMETER_CAUSES, Clipping, Structure, causes
 from ._candidates import Candidate
 from ._clipped import finding
 from ._decide import Decision
-from ._detectable import detectable
+from ._detectable import Unseen, detectable
 from ._diagnosis import CandidateResult, Diagnosis, Estimate, Finding, Rival
 from ._gain import Gain
 from ._residual import Residual, curves
@@ -23,12 +23,19 @@ _SHOWN = 2000
 """Points of a curve in the report."""
 
 
+class Tested(NamedTuple):
+    """Candidates that were fitted, those that were not, and what of the latter would have been seen."""
+
+    trials: list[Trial]
+    left_out: list[Candidate]
+    unseen: Unseen
+
+
 def assemble(
     decision: Decision,
     clipped: list[Clipping],
     refitted: Trial,
-    trials: list[Trial],
-    left_out: list[Candidate],
+    tested: Tested,
     model: Structure,
     extended: Structure,
     records: list[Nuisances],
@@ -37,13 +44,14 @@ def assemble(
     runs: list[dict],
 ) -> Diagnosis:
     """The diagnosis, with everything that the report needs."""
+    trials = tested.trials
     units = records[0].record.units
     findings = _findings(decision, trials, model, units)
     if decision.verdict == "cause":
         findings += tuple(finding(sensor, units[sensor.at[0]]) for sensor in clipped)
     candidates = (
         *(_candidate(t, decision, refitted, model, units) for t in sorted(trials, key=lambda t: -t.evidence)),
-        *(_passed_over(c) for c in sorted(left_out, key=lambda c: -(c.share or 0.0))),
+        *(_passed_over(c) for c in sorted(tested.left_out, key=lambda c: -(c.share or 0.0))),
     )
     winner = decision.winner if decision.winner.at != ("given",) else refitted
     refit = {
@@ -51,7 +59,7 @@ def assemble(
     }
     notes = tuple(dict.fromkeys(note for n in records for note in n.notes))
     noise = {f"{kind} {j}": float(s) for n in records[:1] for (kind, j), s in zip(n.channels, n.floor, strict=True)}
-    smallest = _detectable(trials, model, units)
+    smallest = _detectable(trials, tested.unseen, model, units)
     sentence, advice = _words(decision, findings, gain, imposed=records[0].path is not None)
     data = {
         "jfsm": _version(),
@@ -87,16 +95,17 @@ def _unit(structure: Structure, path: str, units) -> str:
     return structure.entries()[path][0].unit(units["force"], units["displacement"])
 
 
-def _detectable(trials: list[Trial], model: Structure, units) -> dict[str, tuple[str, Estimate]]:
+def _detectable(trials: list[Trial], others: Unseen, model: Structure, units) -> dict[str, tuple[str, Estimate]]:
     """Parameter and smallest size of every cause at the place where it would have shown first."""
+    sizes = [(t.name, t.structure, detectable(t, set(model.entries()))) for t in trials]
+    sizes += [(c.cause.id, structure, size) for c, structure, size in others]
     found: dict[str, tuple[str, Estimate]] = {}
-    for t in trials:
-        size = detectable(t, set(model.entries()))
+    for name, structure, size in sizes:
         if size is None or not math.isfinite(size[1]):
             continue
         path, value = size
-        if t.name not in found or value < found[t.name][1].value:
-            found[t.name] = (path.split(".")[-1], Estimate(value, value, value, _unit(t.structure, path, units)))
+        if name not in found or value < found[name][1].value:
+            found[name] = (path.split(".")[-1], Estimate(value, value, value, _unit(structure, path, units)))
     return found
 
 
