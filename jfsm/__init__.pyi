@@ -3,7 +3,9 @@
 from . import paper as paper
 from . import systems as systems
 from .diagnosis import Diagnosis as Diagnosis
+from .diagnosis import MappedForce as MappedForce
 from .diagnosis import diagnose as diagnose
+from .diagnosis import map_force as map_force
 from .dynamics import Backbone as Backbone
 from .dynamics import FixedPoint as FixedPoint
 from .dynamics import ForcedResponse as ForcedResponse
@@ -19,7 +21,9 @@ from .dynamics import linearise as linearise
 from .dynamics import simulate as simulate
 from .dynamics import simulate_many as simulate_many
 from .estimation import Motion as Motion
+from .estimation import RestoringForce as RestoringForce
 from .estimation import estimate_motion as estimate_motion
+from .estimation import restoring_force as restoring_force
 from .identification import Fit as Fit
 from .identification import fit as fit
 from .records import Record as Record
@@ -92,3 +96,4 @@ from .surrogates import RadialBasis as RadialBasis
 from .surrogates import Spherical as Spherical
 from .surrogates import Spline as Spline
 from .surrogates import find_discontinuities as find_discontinuities
+from .surrogates import load_map as load_map

@@ -232,7 +232,7 @@ def diagnose(
     holdout: Annotated[str, typer.Option(help="Share of the record that is held out, a second file, or none.")] = "0.3",
     report: Annotated[Path | None, _option("Write the page here, as HTML.")] = None,
     json: Annotated[Path | None, _option("Write every number here, as JSON.")] = None,
-    extended: Annotated[Path | None, _option("Write the mended model here, as TOML.")] = None,
+    extended: Annotated[Path | None, _option("Write the mended model here, as TOML; a map goes beside it.")] = None,
     cause: Annotated[
         list[str] | None, typer.Option(help="Look for this cause (`jfsm causes` lists them); repeat for more.")
     ] = None,
@@ -251,13 +251,53 @@ def diagnose(
     if json is not None:
         d.to_json(json)
     if extended is not None:
-        try:
-            d.extended.save(extended)
-        except ValueError as error:  # a map stands in, and TOML holds none: what was found stands nevertheless
-            _say(f"--extended was not written. {error}")
+        d.extended.save(extended)
     d.print()  # last, so that a reader who closes the pipe loses no file
     if d.verdict != "consistent":
         raise typer.Exit(FOUND)
+
+
+@command
+@takes_record
+def map(
+    source: RecordFile,
+    model: Annotated[Path | None, _option("Map what this model lacks, as TOML; else all of the force.")] = None,
+    mass: Annotated[float | None, _option("Mass of a single degree of freedom, without a model.", "KG")] = None,
+    at: Annotated[str | None, _option("The link, where the model has several; 0 is ground.", "I-J")] = None,
+    method: Annotated[str, typer.Option(help="What learns the map: rkpm or kriging.")] = "rkpm",
+    order: Annotated[int | None, _option("Order of its polynomials; chosen by the readings without it.")] = None,
+    out: Annotated[Path | None, _option("Write the map here, as npz.")] = None,
+    report: Annotated[Path | None, _option("Write the page here, as HTML.")] = None,
+) -> None:
+    """Map the force of a record, or what a model lacks of it, over displacement and velocity."""
+    from .diagnosis import map_force
+
+    inputs = [source.record] if model is None else [source.record, model]
+    _check_outputs({"--out": out, "--report": report}, inputs)
+    record, believed, link = source.read(), None if model is None else _load(model), _link(at)
+    with _progress() as tell:
+        tell("the motion and the map", 0, 1)
+        found = map_force(record, believed, mass, link, method, order)
+    if out is not None:
+        found.force_map.save(out)
+    if report is not None:
+        found.report(report)
+    found.print()  # last, so that a reader who closes the pipe loses no file
+
+
+@command
+def report(
+    numbers: Annotated[
+        Path, typer.Argument(metavar="JSON", help="What `jfsm diagnose --json` wrote.", show_default=False)
+    ],
+    report: Annotated[Path, _option("Write the page here, as HTML.")],
+) -> None:
+    """Make the page of a diagnosis again from its numbers."""
+    from .reporting import render_json, write_text_atomically
+
+    _check_outputs({"--report": report}, [numbers])
+    write_text_atomically(report, render_json(numbers))
+    typer.echo(f"The page is {report.resolve()}.")
 
 
 @command
@@ -372,7 +412,7 @@ def _table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -
         table.add_column(heading, no_wrap=True)
     table.add_column(headings[-1])
     for row in rows:
-        table.add_row(*map(Text, row))  # as text: a bracket in a unit or an interval is not markup
+        table.add_row(*(Text(cell) for cell in row))  # as text: a bracket in a unit or an interval is not markup
     Console().print(table)
 
 
@@ -451,6 +491,16 @@ def _where(given: Sequence[str] | None) -> dict[str, str | float] | None:
         except ValueError:
             found[name] = value
     return found or None
+
+
+def _link(text: str | None) -> tuple[int, int] | None:
+    """A link, from ``0-1``."""
+    if text is None:
+        return None
+    ends = re.fullmatch(r"(\d+)-(\d+)", text)
+    if not ends:
+        raise ValueError(f"--at must be two degrees of freedom, as 0-1, where 0 is ground; it was {text!r}.")
+    return int(ends[1]), int(ends[2])
 
 
 def _holdout(text: str, source: RecordFile) -> "float | Record | None":

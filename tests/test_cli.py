@@ -17,7 +17,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from typer.testing import CliRunner, Result
 
-from jfsm import Record, Structure, read
+from jfsm import Polynomial, Record, Structure, load_map, read
 from jfsm.cli import app
 
 MASS, STIFFNESS, DAMPING = 2.0, 1800.0, 3.0
@@ -93,7 +93,7 @@ def answer(monkeypatch, verdict: str = "consistent") -> dict[str, Any]:
 def test_help_names_every_command():
     result = run("--help")
     assert result.exit_code == 0
-    for name in ("inspect", "simulate", "fit", "diagnose", "causes", "demo", "paper"):
+    for name in ("inspect", "simulate", "fit", "diagnose", "map", "causes", "report", "demo", "paper"):
         assert name in result.stdout
 
 
@@ -413,17 +413,21 @@ def test_a_model_that_is_right_and_one_that_is_too_stiff_are_told_apart(channels
     assert json.loads(numbers.read_text(encoding="utf-8"))["verdict"] == "parameters"
     assert page.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     assert Structure.load(mended).values()["stiffness@0-1.k"] == pytest.approx(STIFFNESS, rel=0.02)
+    again = run("report", numbers, "--report", tmp_path / "again.html")
+    assert (again.exit_code, again.stderr) == (0, "")
+    assert f"The page is {tmp_path / 'again.html'}." in again.stdout
+    assert (tmp_path / "again.html").read_bytes() == page.read_bytes()
 
 
-def test_a_mended_model_that_is_a_map_is_not_written_but_the_finding_stands(channels, folder, tmp_path, monkeypatch):
-    def no_table(path):
-        raise ValueError("A structure with a map cannot be written as TOML.")
-
-    found = FakeDiagnosis(verdict="unnamed", extended=SimpleNamespace(save=no_table))
+def test_a_mended_model_keeps_its_map_in_a_file_beside_it(channels, folder, tmp_path, monkeypatch):
+    states = np.random.default_rng(1).uniform(-1, 1, (40, 2))
+    mended = Structure.load(folder / "model.toml") + Polynomial.fit(states, states[:, 0] ** 3).on((0, 1))
+    found = FakeDiagnosis(verdict="unnamed", extended=mended)
     monkeypatch.setattr("jfsm.diagnosis.diagnose", lambda *arguments, **options: found)
     result = run("diagnose", *channels, "--model", folder / "model.toml", "--extended", tmp_path / "mended.toml")
-    assert result.exit_code == 1
-    assert result.stderr == "jfsm: --extended was not written. A structure with a map cannot be written as TOML.\n"
+    assert (result.exit_code, result.stderr) == (1, "")
+    assert {path.name for path in tmp_path.iterdir()} == {"mended.toml", "mended.map.npz"}
+    assert Structure.load(tmp_path / "mended.toml").terms[-1].kind == "map"
 
 
 def test_a_diagnosis_looks_for_the_causes_that_it_is_asked_for(folder, channels, monkeypatch):
@@ -432,6 +436,82 @@ def test_a_diagnosis_looks_for_the_causes_that_it_is_asked_for(folder, channels,
     assert seen["causes"] is None
     run("diagnose", *channels, "--model", folder / "model.toml", "--cause", "jenkins", "--cause", "maxwell")
     assert seen["causes"] == ["jenkins", "maxwell"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('{"verdict": "cause", "find', "It may be cut short, or be another file. Write or copy it again."),
+        ("", "It may be cut short"),
+        ("\xff", "It may be cut short"),
+        ("[1, 2]", "it has no verdict"),
+        ('{"a": 1}', "it has no verdict"),
+        ('{"verdict": "good"}', "its 'verdict' was 'good'"),
+        ('{"verdict": "cause", "findings": 3}', "(TypeError: "),
+        ('{"verdict": "cause", "findings": ["cubic"]}', "(TypeError: "),
+    ],
+)
+def test_a_file_that_holds_no_diagnosis_gives_no_page(text, words, tmp_path):
+    (tmp_path / "d.json").write_bytes(text.encode("latin-1"))
+    line = refusal("report", tmp_path / "d.json", "--report", tmp_path / "page.html")
+    assert f"{tmp_path / 'd.json'} must be what `jfsm diagnose --json d.json` writes" in line and words in line
+    assert [path.name for path in tmp_path.iterdir()] == ["d.json"]
+
+
+def test_the_numbers_of_a_page_are_not_written_over_and_have_to_be_there(tmp_path):
+    (tmp_path / "d.json").write_text("{}")
+    line = refusal("report", tmp_path / "d.json", "--report", tmp_path / "d.json")
+    assert "--report must not be a file that is needed" in line
+    line = refusal("report", tmp_path / "none.json", "--report", tmp_path / "page.html")
+    assert line == f"jfsm: No such file or directory: {tmp_path / 'none.json'}"
+
+
+def test_an_inspection_as_json_gives_its_page(channels, folder, tmp_path):
+    inspection = read(folder / "run.csv", force="u", displacement="y", units={"u": "N", "y": "mm"}).inspect()
+    (tmp_path / "inspection.json").write_text(json.dumps(inspection.to_dict()))
+    assert run("report", tmp_path / "inspection.json", "--report", tmp_path / "page.html").exit_code == 0
+    assert "displacement 1" in (tmp_path / "page.html").read_text()
+
+
+def test_a_force_is_mapped_printed_shown_and_written(channels, folder, tmp_path):
+    out, page = tmp_path / "map.npz", tmp_path / "page.html"
+    result = run("map", *channels, "--mass", MASS, "--order", 1, "--out", out, "--report", page)
+    assert (result.exit_code, result.stderr) == (0, "")
+    told = flat(result.stdout)
+    for words in (
+        "RKPM, order 1",
+        "Leave-one-out error",
+        "stiffness dF/dx",
+        "N/m",
+        "damping dF/dv",
+        "N s/m",
+        "Visited",
+    ):
+        assert words in told
+    assert "cubic" not in told  # a map of order 1 has no third derivative
+    text = page.read_text(encoding="utf-8")
+    assert text.startswith("<!DOCTYPE html>") and text.count("<svg") == 2 and "stiffness dF/dx" in text
+    assert load_map(out).gradient([0.0, 0.0])[0] == pytest.approx(STIFFNESS, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ([], "`model` or `mass` must be given, and not both"),
+        (["--mass", 2.0, "--model", "model.toml"], "`model` or `mass` must be given, and not both"),
+        (["--mass", -2.0], "`mass` must be positive; got -2"),
+        (["--mass", 2.0, "--at", "1"], "--at must be two degrees of freedom, as 0-1, where 0 is ground; it was '1'."),
+        (["--mass", 2.0, "--at", "1-2"], "`model` must be given for the link (1, 2)"),
+        (["--mass", 2.0, "--method", "splines"], '`method` must be "rkpm" or "kriging"; got \'splines\'.'),
+        (["--mass", 2.0, "--order", 0], "`order` must be an integer of 1 or more; got 0."),
+        (["--mass", 2.0, "--out", "run.csv"], "--out must not be a file that is needed"),
+    ],
+)
+def test_a_map_that_cannot_be_is_refused(options, words, channels, folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    before = (folder / "run.csv").read_bytes()
+    assert words in refusal("map", *channels, *options)
+    assert (folder / "run.csv").read_bytes() == before
 
 
 def test_causes_are_listed_with_their_parameters():

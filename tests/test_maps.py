@@ -1,5 +1,10 @@
 """Maps behind one contract: moving least squares, radial basis functions, one polynomial, and RKPM beside them."""
 
+import io
+import json
+import os
+from pathlib import Path
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -8,7 +13,21 @@ import pytest
 from scipy.interpolate import RBFInterpolator
 
 from jfsm.structures import MapTerm
-from jfsm.surrogates import RKPM, CubicSplineWindow, MovingLeastSquares, Polynomial, RadialBasis
+from jfsm.surrogates import (
+    RKPM,
+    CubicSplineWindow,
+    GaussianWindow,
+    Kriging,
+    Matern52,
+    MovingLeastSquares,
+    Plane,
+    Polynomial,
+    PowerExponential,
+    RadialBasis,
+    find_discontinuities,
+    load_map,
+    tabulate,
+)
 
 FAMILIES = (RKPM, MovingLeastSquares, RadialBasis, Polynomial)
 UNITS = np.array([0.02, 3.0])
@@ -146,3 +165,139 @@ def test_a_wrong_fit_of_another_map_is_refused(family, arguments, message):
 def test_a_spline_without_spare_nodes_has_no_standard_error():
     with pytest.raises(ValueError, match="`std` needs more neighbours than the 6 monomials"):
         RadialBasis.fit(STATES, quadratic(STATES), order=2, neighbours=6).std(QUERIES[0])
+
+
+def jumping(states):
+    return quadratic(states) + 5.0 * np.sign(states[..., 1])
+
+
+SAVED = {
+    "RKPM": lambda: RKPM.fit(STATES, quadratic(STATES), order=2),
+    "RKPM, window": lambda: RKPM.fit(STATES, TWO_OUTPUTS, window=GaussianWindow(0.3), across=[Plane((1, 0), 0.001)]),
+    "RKPM, robust": lambda: RKPM.fit(
+        STATES, jumping(STATES), across=find_discontinuities(STATES, jumping(STATES)), robust=True
+    ),
+    "moving least squares": lambda: MovingLeastSquares.fit(STATES, TWO_OUTPUTS),
+    "radial basis": lambda: RadialBasis.fit(STATES, TWO_OUTPUTS, smoothing=0.1),
+    "polynomial": lambda: Polynomial.fit(STATES, TWO_OUTPUTS),
+    "kriging": lambda: Kriging.fit(STATES[:60], smooth_force(STATES[:60])),
+    "kriging, outputs": lambda: Kriging.fit(
+        STATES[:60], TWO_OUTPUTS[:60], PowerExponential(1.5), "pure quadratic", length_scale=UNITS, nugget=0.1
+    ),
+    "kriging, shared": lambda: Kriging.fit(
+        STATES[:60], TWO_OUTPUTS[:60], Matern52(), length_scale=UNITS, nugget=0.1, shared=True
+    ),
+    "table": lambda: tabulate(RKPM.fit(STATES, quadratic(STATES), order=2), nodes=12),
+}
+
+
+@pytest.mark.parametrize("make", SAVED.values(), ids=SAVED)
+def test_a_file_gives_a_map_back_to_the_last_bit(make, tmp_path):
+    force_map = make()
+    force_map.save(tmp_path / "map.npz")
+    loaded = load_map(tmp_path / "map.npz")
+    assert jax.tree.structure(loaded) == jax.tree.structure(force_map)
+    for mine, theirs in zip(jax.tree.leaves(loaded), jax.tree.leaves(force_map), strict=True):
+        assert mine.dtype == theirs.dtype and np.array_equal(mine, theirs)
+    for query in QUERIES[:2]:
+        assert np.array_equal(loaded(query), force_map(query))
+    assert [path.name for path in tmp_path.iterdir()] == ["map.npz"]
+
+
+def test_a_map_with_an_interface_of_its_owner_is_not_written(tmp_path):
+    force_map = RKPM.fit(STATES, jumping(STATES), order=2, across=[lambda state: state[1]])
+    with pytest.raises(ValueError, match=r"can be written if all its parts are those of jfsm; its rule\.across\.0 is"):
+        force_map.save(tmp_path / "map.npz")
+    assert list(tmp_path.iterdir()) == []
+
+
+class Trap:
+    """Leaves a file behind when it is unpickled."""
+
+    def __init__(self, path: Path):
+        self.path = path
+
+    def __reduce__(self):
+        return Path.touch, (self.path,)
+
+
+def changed(change, tmp_path: Path) -> Path:
+    """The file of an RKPM map whose arrays and header were changed by hand."""
+    path = tmp_path / "map.npz"
+    RKPM.fit(STATES, quadratic(STATES), order=2).save(path)
+    with np.load(path) as archive:
+        arrays = dict(archive)
+    header = json.loads(str(arrays["header"]))
+    change(arrays, header["map"])
+    np.savez(path, **{**arrays, "header": np.array(json.dumps(header))})
+    return path
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda arrays, parts: arrays.pop("nodes.reach"), "nodes.reach"),
+        (lambda arrays, parts: arrays.update(more=np.ones(3)), "'more' belongs to no part of the map"),
+        (lambda arrays, parts: arrays.update({"nodes.scale": np.ones(3)}), r"scale of Nodes of shape \(3,\)"),
+        (lambda arrays, parts: arrays.update({"nodes.scale": np.array([1.0, np.nan])}), "numbers in double precision"),
+        (lambda arrays, parts: arrays.update({"nodes.scale": np.array([1, 2])}), "one is of int64"),
+        (lambda arrays, parts: parts.update({"class": "Popen"}), "Popen"),
+        (lambda arrays, parts: parts["nodes"].update({"class": "Rule"}), "a Rule has window, order"),
+        (lambda arrays, parts: parts["rule"]["window"].update({"class": "Gaussian"}), "window of Rule"),
+        (lambda arrays, parts: parts["rule"].update(order=True), "order of Rule"),
+        (lambda arrays, parts: parts["rule"].update(order=10**9), "`neighbours` must be an integer from"),
+        (lambda arrays, parts: parts["rule"].update(neighbours=10**9), "`neighbours` must be an integer from"),
+        (lambda arrays, parts: parts["rule"].update(across=[{"class": "Gaussian"}]), "return one number"),
+        (lambda arrays, parts: arrays.update({"rule.dilation": np.array(-1.0)}), "`dilation` must lie above 0"),
+        (lambda arrays, parts: (parts.clear(), parts.update({"class": "Gaussian"}), arrays.clear()), "is no map"),
+    ],
+)
+def test_a_file_that_was_changed_is_refused(change, words, tmp_path):
+    path = changed(change, tmp_path)
+    with pytest.raises(ValueError, match=rf"(?s)map\.npz must be a map that `force_map.save\(path\)` wrote.*{words}"):
+        load_map(path)
+
+
+def test_nothing_in_a_file_is_run(tmp_path):
+    path = changed(
+        lambda arrays, parts: arrays.update(evil=np.array(Trap(tmp_path / "sprung"), dtype=object)), tmp_path
+    )
+    with pytest.raises(ValueError, match=r"map\.npz must be a map"):
+        load_map(path)
+    assert not (tmp_path / "sprung").exists()
+
+
+@pytest.mark.parametrize("content", [b"", b"nonsense", b"PK\x03\x04nonsense"])
+def test_a_file_that_is_no_map_is_refused(content, tmp_path):
+    (tmp_path / "map.npz").write_bytes(content)
+    with pytest.raises(
+        ValueError, match=r"map\.npz must be a map that `force_map.save\(path\)` wrote; .*Save or copy it"
+    ):
+        load_map(tmp_path / "map.npz")
+    with pytest.raises(FileNotFoundError, match=r"There is no map file .*none\.npz; write one with `force_map.save"):
+        load_map(tmp_path / "none.npz")
+
+
+def test_a_map_that_is_cut_short_is_refused_and_so_is_a_record(tmp_path):
+    stream = io.BytesIO()
+    RKPM.fit(STATES, quadratic(STATES), order=2).save(stream)
+    for length in (100, len(stream.getvalue()) // 2, len(stream.getvalue()) - 30):
+        (tmp_path / "map.npz").write_bytes(stream.getvalue()[:length])
+        with pytest.raises(ValueError, match="It may be cut short"):
+            load_map(tmp_path / "map.npz")
+    np.savez(tmp_path / "run.npz", time=np.arange(3.0))
+    with pytest.raises(ValueError, match="it says of no map what it is made of"):
+        load_map(tmp_path / "run.npz")
+
+
+def test_a_map_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch):
+    path = tmp_path / "map.npz"
+    path.write_bytes(b"old")
+
+    def full_disk(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", full_disk)
+    with pytest.raises(OSError, match="No space left on device"):
+        Polynomial.fit(STATES, quadratic(STATES)).save(path)
+    assert path.read_bytes() == b"old" and list(tmp_path.iterdir()) == [path]

@@ -1,5 +1,6 @@
 """Structures: what they are made of, how their numbers are named, and what a model file may hold."""
 
+import os
 from pathlib import Path
 from typing import Any, cast
 
@@ -12,6 +13,7 @@ from jfsm.dynamics._forces import smooth_force
 from jfsm.dynamics._plant import direction, lower
 from jfsm.structures import AbstractTerm, AccelerationGain, ForceGain, MapTerm, Offset
 from jfsm.structures.terms import TERMS
+from jfsm.surrogates import tabulate
 
 LAWS = {
     "stiffness": lambda p, d, w: p * d,
@@ -217,12 +219,71 @@ def test_saving_leaves_nothing_but_the_file_and_lets_others_read_it_as_any_new_f
     assert (tmp_path / "model.toml").stat().st_mode == (tmp_path / "plain").stat().st_mode
 
 
-def test_a_map_is_not_written_and_the_file_that_was_there_stays(tmp_path):
+def test_a_function_in_place_of_a_map_is_not_written_and_the_file_that_was_there_stays(tmp_path):
     path: Path = tmp_path / "model.toml"
     path.write_text("mass = [1.0]\n")
-    with pytest.raises(ValueError, match="A structure with a map cannot be written as TOML; keep the record and fit"):
-        (full() + MapTerm(jnp.sum, at=(0, 1))).save(path)
-    assert path.read_text() == "mass = [1.0]\n"
+    with pytest.raises(
+        ValueError, match=r"A structure can be written if its maps are those of jfsm.*the map at 0-1 is"
+    ):
+        (full() + learned().on((0, 1)) + MapTerm(jnp.sum, at=(0, 1))).save(path)
+    assert path.read_text() == "mass = [1.0]\n" and list(tmp_path.iterdir()) == [path]
+
+
+def learned(slope: float = 3.0) -> jfsm.Polynomial:
+    states = np.random.default_rng(1).uniform(-1, 1, (40, 2))
+    return jfsm.Polynomial.fit(states, slope * states[:, 0] + states[:, 1] ** 3)
+
+
+def test_maps_are_kept_in_files_beside_the_structure(tmp_path):
+    model = full() + learned().on((0, 1)) + tabulate(learned(5.0), nodes=8).on((1, 2))
+    model.save(tmp_path / "model.toml")
+    assert {path.name for path in tmp_path.iterdir()} == {"model.toml", "model.map.npz", "model.map2.npz"}
+    (tmp_path / "elsewhere").mkdir()
+    for path in list(tmp_path.glob("model.*")):
+        path.rename(tmp_path / "elsewhere" / path.name)
+    loaded = jfsm.Structure.load(tmp_path / "elsewhere" / "model.toml")
+    assert [(type(p), p.at) for p in loaded.terms] == [(type(p), p.at) for p in model.terms]
+    d, w = jnp.asarray(0.3), jnp.asarray(-0.2)
+    for mine, theirs in zip(loaded.terms[-2:], model.terms[-2:], strict=True):
+        assert mine.force(d, w, (), d) == theirs.force(d, w, (), d)
+
+
+def test_a_structure_and_its_maps_are_written_together_or_not_at_all(tmp_path, monkeypatch):
+    def full_disk(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", full_disk)
+    with pytest.raises(OSError, match="No space left on device"):
+        (full() + learned().on((0, 1))).save(tmp_path / "model.toml")
+    assert list(tmp_path.iterdir()) == []
+
+
+MAP = 'mass = [1.0]\n[[term]]\nkind = "map"\nat = [0, 1]\n'
+
+
+@pytest.mark.parametrize(
+    ("toml", "error", "words"),
+    [
+        (MAP, ValueError, r"model\.toml, term 1: map takes file; got nothing\."),
+        (MAP + 'file = "map.npz"\nk = 3.0', ValueError, r"model\.toml, term 1: map takes file; got file, k\."),
+        (
+            MAP + "file = 3",
+            ValueError,
+            r"model\.toml, term 1: `file` must name the file of a map, as file = .*; got 3\.",
+        ),
+        (MAP + 'file = "none.npz"', FileNotFoundError, r"There is no map file .*none\.npz; write one with"),
+        (MAP + 'file = "model.toml"', ValueError, r"model\.toml, term 1: .*model\.toml must be a map that"),
+        (MAP.replace("[0, 1]", "[0, 2]") + 'file = "map.npz"', ValueError, r"names a degree of freedom beyond"),
+        (MAP + 'file = "four.npz"', ValueError, r"model\.toml, term 1: `on` needs a map of one displacement and one"),
+    ],
+)
+def test_a_term_that_names_no_map_is_refused(toml, error, words, tmp_path):
+    learned().save(tmp_path / "map.npz")
+    states = np.random.default_rng(1).uniform(-1, 1, (40, 4))
+    jfsm.Polynomial.fit(states, states[:, 0], order=1).save(tmp_path / "four.npz")
+    (tmp_path / "model.toml").write_text(toml)
+    with pytest.raises(error, match=words):
+        jfsm.Structure.load(tmp_path / "model.toml")
 
 
 def test_whole_numbers_in_a_file_are_read_as_numbers(tmp_path):

@@ -4,3 +4,5 @@ from ._diagnose import diagnose as diagnose
 from ._diagnosis import Diagnosis as Diagnosis
 from ._diagnosis import Estimate as Estimate
 from ._diagnosis import Finding as Finding
+from ._map_force import MappedForce as MappedForce
+from ._map_force import map_force as map_force

@@ -12,13 +12,13 @@ from ..dynamics._plant import direction
 from ..identification import Hypothesis, Nuisances, Posterior, missing_force
 from ..structures import AbstractTerm, Structure
 from ..surrogates import RKPM, HermiteTable, tabulate
+from ._shown import GRID, shown_map, shown_points
 from ._trial import Trial, predict
 
 _NODES = 2000
 """Points that a map is made of; more of a trajectory are near duplicates."""
 _NEIGHBOURS = 160
 """Points that support a map at one state: sixteen per monomial of a cubic, as noisy points need."""
-_GRID = 41
 
 
 @dataclass(frozen=True)
@@ -84,29 +84,12 @@ def table_of(found: Residual) -> HermiteTable | None:
 
 def curves(found: Residual, units, term: AbstractTerm | None) -> dict[str, Any]:
     """Points, map and law for the report, as plain lists."""
-    take = evenly_taken(found.force.size, 1500)
-    points = {
-        "at": list(found.at),
-        "displacement": found.displacement[take].tolist(),
-        "velocity": found.velocity[take].tolist(),
-    }
-    points |= {
-        "force": found.force[take].tolist(),
-        "unit": {k: units[k] for k in ("displacement", "velocity", "force")},
-    }
-    x = np.linspace(found.displacement.min(), found.displacement.max(), _GRID)
-    v = np.linspace(found.velocity.min(), found.velocity.max(), _GRID)
+    points = shown_points(found.at, found.displacement, found.velocity, found.force, units)
+    x = np.linspace(found.displacement.min(), found.displacement.max(), GRID)
+    v = np.linspace(found.velocity.min(), found.velocity.max(), GRID)
     drawn: dict[str, Any] = {"residual": points, "map": None, "law": None}
     if found.force_map is not None:
-        states = np.stack(np.meshgrid(x, v, indexing="ij"), -1).reshape(-1, 2)
-        values = np.asarray(found.force_map.evaluate(states)).reshape(_GRID, _GRID)
-        visited = np.asarray(found.force_map.visited(states)).reshape(_GRID, _GRID)
-        drawn["map"] = {
-            "displacement": x.tolist(),
-            "velocity": v.tolist(),
-            "force": values.tolist(),
-            "visited": visited.tolist(),
-        }
+        drawn["map"] = shown_map(found.force_map, x, v)
     if term is not None and not term.states and term.delay is None:
         zero = jnp.zeros(())
         along_x = [float(term.force(d, zero, (), zero)) for d in jnp.asarray(x)]

@@ -9,3 +9,5 @@ from ._latent import Latent as Latent
 from ._latent import latent_force as latent_force
 from ._motion import Motion as Motion
 from ._motion import estimate_motion as estimate_motion
+from ._restoring_force import RestoringForce as RestoringForce
+from ._restoring_force import restoring_force as restoring_force

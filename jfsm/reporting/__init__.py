@@ -1,9 +1,14 @@
 """What is shown: terminal text, pictures and pages, from plain dictionaries such as ``Diagnosis.to_json`` writes."""
 
+from ._files import write_atomically as write_atomically
 from ._files import write_text_atomically as write_text_atomically
+from ._force_map_page import force_map_pictures as force_map_pictures
+from ._force_map_page import print_force_map as print_force_map
+from ._force_map_page import render_force_map as render_force_map
 from ._inspection_page import render_inspection as render_inspection
 from ._inspection_pictures import inspection_pictures as inspection_pictures
 from ._page import render_page as render_page
+from ._page_again import render_json as render_json
 from ._pictures import pictures as pictures
 from ._pictures import plot_diagnosis as plot_diagnosis
 from ._sketch import Picture as Picture

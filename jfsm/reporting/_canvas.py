@@ -132,7 +132,9 @@ def key_above(axes: Axes, columns: int) -> None:
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.1, handlelength=1.6)
 
 
-def dots(axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], colour: str, text: str) -> None:
+def dots(
+    axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], colour: str, text: str, width: float = 2.0
+) -> None:
     """Points, and an entry in the legend; with a marker each, a page would be ten times as large."""
     points = np.column_stack([x, y])
     points = points[np.isfinite(points).all(axis=1)]
@@ -141,5 +143,5 @@ def dots(axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], colour: str
     ends = np.stack([points - half, points + half], axis=1).reshape(-1, 2)
     strokes = Path(ends, np.tile([Path.MOVETO, Path.LINETO], len(points)))
     strokes.should_simplify = False
-    axes.add_patch(PathPatch(strokes, fill=False, edgecolor=colour, linewidth=2.0, capstyle="round", alpha=0.6))
+    axes.add_patch(PathPatch(strokes, fill=False, edgecolor=colour, linewidth=width, capstyle="round", alpha=0.6))
     axes.plot([], [], ".", color=colour, alpha=0.6, label=text)

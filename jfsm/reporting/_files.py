@@ -1,34 +1,42 @@
-"""Writing a file so that a reader sees the old one or the new one, never half of it."""
+"""Writing files so that a reader sees the old ones or the new ones, never half of one."""
 
 import os
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 
 def write_text_atomically(path: str | os.PathLike[str], text: str) -> None:
-    """Write `text` as UTF-8 to a temporary file beside `path`, then move it there in one step.
+    """Write `text` as UTF-8; see `write_atomically`."""
+    write_atomically({path: text.encode()})
+
+
+def write_atomically(files: Mapping[str | os.PathLike[str], bytes]) -> None:
+    """Write each file to a temporary one beside it, and when all are complete move them into place, in their order.
 
     Raises
     ------
     OSError
-        If the folder is missing or cannot be written to, or `path` is a folder; of the same kind as the operating
-        system's own error, naming `path`. Whatever stood at `path` is still there.
+        If a folder is missing or cannot be written to, or a path is a folder; of the same kind as the operating
+        system's own error, naming the path. Whatever stood there is still there.
     """
-    target = Path(path)
+    parts: dict[Path, Path] = {}
+    target = Path()
     try:
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".part")
-    except OSError as error:
-        raise _naming(target, error) from error
-    part = Path(name)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
-            stream.write(text)
-        part.chmod(_permissions(target))
-        os.replace(part, target)
+        for path, content in files.items():
+            target = Path(path)
+            handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".part")
+            parts[target] = Path(name)
+            with os.fdopen(handle, "wb") as stream:
+                stream.write(content)
+            parts[target].chmod(_permissions(target))
+        for target, part in parts.items():
+            os.replace(part, target)
     except OSError as error:
         raise _naming(target, error) from error
     finally:
-        part.unlink(missing_ok=True)
+        for part in parts.values():
+            part.unlink(missing_ok=True)
 
 
 def _permissions(target: Path) -> int:

@@ -1,6 +1,6 @@
 """The force that the simulation leaves over: along each axis of the state, and as a map over the plane."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from matplotlib.figure import FigureBase
 from jfsm.reporting._canvas import AFTER, FLOOR, INK, PAPER, dots, key_above, label
 from jfsm.reporting._curves import Curve, curve, peak
 from jfsm.reporting._quantities import Scale, quantity, scale_for
+from jfsm.reporting._wording import capitalised
 
 AXES = {"displacement": "velocity", "velocity": "displacement"}  # an axis, and the other one
 NEAR_ZERO = 0.2  # of the other axis' peak: points that the law's line, drawn for 0 there, should meet
@@ -18,8 +19,20 @@ LEVELS = 15
 ZERO_LINE = "#3a444e"  # crosses the pale middle of the colours, in a dark theme too
 
 
-def draw_residual(figure: FigureBase, residual: Mapping[str, Any], law: Mapping[str, Any] | None) -> None:
-    """Points of the residual force against displacement and against velocity, the named law's line over them."""
+RESIDUAL, LAW = "residual force", "named law"
+
+
+def draw_residual(
+    figure: FigureBase,
+    residual: Mapping[str, Any],
+    law: Mapping[str, Any] | None,
+    name: str = RESIDUAL,
+    line_name: str = LAW,
+) -> None:
+    """Points of a force against displacement and against velocity, the line of a law or a map over them.
+
+    A line has a band where its error is given.
+    """
     force, units = curve(residual["force"]), residual.get("unit") or {}
     force_scale = scale_for(peak(force), units.get("force"))
     for place, (axis, other) in enumerate(AXES.items(), start=1):
@@ -28,9 +41,12 @@ def draw_residual(figure: FigureBase, residual: Mapping[str, Any], law: Mapping[
         points = curve(residual[axis]) / scale.factor, force / force_scale.factor
         _draw_points(axes, *points, curve(residual[other]), other)
         if law and law.get(f"force_of_{axis}"):
-            line = curve(law[axis]) / scale.factor, curve(law[f"force_of_{axis}"]) / force_scale.factor
-            axes.plot(*line, color=AFTER, linewidth=2.0, label="named law")
-        label(axes, f"{axis} [{scale.unit}]", f"residual force [{force_scale.unit}]")
+            along, line = curve(law[axis]) / scale.factor, curve(law[f"force_of_{axis}"]) / force_scale.factor
+            if f"error_of_{axis}" in law:
+                half = curve(law[f"error_of_{axis}"]) / force_scale.factor
+                axes.fill_between(along, line - half, line + half, color=AFTER, alpha=0.25, linewidth=0.0)
+            axes.plot(along, line, color=AFTER, linewidth=2.0, label=line_name)
+        label(axes, f"{axis} [{scale.unit}]", f"{name} [{force_scale.unit}]")
         key_above(axes, 3)
 
 
@@ -43,17 +59,29 @@ def _draw_points(axes: Axes, along: Curve, force: Curve, across: Curve, other: s
     axes.autoscale_view()
 
 
-def describe_residual(residual: Mapping[str, Any], law: Mapping[str, Any] | None) -> str:
+def describe_residual(
+    residual: Mapping[str, Any], law: Mapping[str, Any] | None, name: str = RESIDUAL, line_name: str = LAW
+) -> str:
     """The picture in words."""
     units = residual.get("unit") or {}
     reach = [f"{axis} up to {quantity(peak(curve(residual[axis])), units.get(axis))}" for axis in AXES]
     force = quantity(peak(curve(residual["force"])), units.get("force"))
-    line = " The named law is drawn through the points." if law else ""
-    return f"Residual force, up to {force}, against {reach[0]} and against {reach[1]}.{line}"
+    line = f" The {line_name} is drawn through the points." if law else ""
+    return f"{capitalised(name)}, up to {force}, against {reach[0]} and against {reach[1]}.{line}"
 
 
-def draw_map(figure: FigureBase, force_map: Mapping[str, Any], units: Mapping[str, str]) -> None:
-    """Filled contours of the residual force over displacement and velocity; pale where the record never was."""
+def draw_map(
+    figure: FigureBase,
+    force_map: Mapping[str, Any],
+    units: Mapping[str, str],
+    name: str = RESIDUAL,
+    readings: Mapping[str, Any] | None = None,
+    edges: Sequence[Mapping[str, Any]] = (),
+) -> None:
+    """Filled contours of a force over displacement and velocity; pale where the record never was.
+
+    With the states of its readings as dots, and lines where it jumps or kinks, if these are given.
+    """
     x, v, force = (curve(force_map[part]) for part in ("displacement", "velocity", "force"))
     scales = [
         _scale(values, units.get(kind)) for values, kind in ((x, "displacement"), (v, "velocity"), (force, "force"))
@@ -70,20 +98,26 @@ def draw_map(figure: FigureBase, force_map: Mapping[str, Any], units: Mapping[st
     if visited.any() and not visited.all():
         axes.contourf(x, v, visited.T.astype(float), levels=[-1.0, 0.5], colors=PAPER, alpha=0.7)
         axes.contour(x, v, visited.T.astype(float), levels=[0.5], colors=INK, linewidths=0.8, linestyles="dashed")
+    if readings:
+        x, v = (curve(readings[kind]) / scale.factor for kind, scale in zip(AXES, scales, strict=False))
+        dots(axes, x, v, INK, "", width=1.0)
+    for edge in edges:
+        across = axes.axvline if edge["axis"] == "displacement" else axes.axhline
+        across(edge["offset"] / scales[list(AXES).index(edge["axis"])].factor, color=INK, linewidth=1.2, linestyle=":")
     bar = figure.colorbar(filled, ax=axes, pad=0.02, ticks=levels[:: (LEVELS - 1) // 2])
-    bar.set_label(f"residual force [{scales[2].unit}]")
+    bar.set_label(f"{name} [{scales[2].unit}]")
     bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
     axes.grid(False)
     label(axes, f"displacement [{scales[0].unit}]", f"velocity [{scales[1].unit}]")
 
 
-def describe_map(force_map: Mapping[str, Any], units: Mapping[str, str]) -> str:
+def describe_map(force_map: Mapping[str, Any], units: Mapping[str, str], name: str = RESIDUAL) -> str:
     """The picture in words."""
     visited = force_map.get("visited")
     share = f"; the record visited {100 * np.mean(visited):.0f} % of the plane shown" if visited else ""
     force = curve(force_map["force"])
     low, high = (quantity(float(bound), units.get("force")) for bound in (np.nanmin(force), np.nanmax(force)))
-    return f"Map of the residual force over displacement and velocity, from {low} to {high}{share}."
+    return f"Map of the {name} over displacement and velocity, from {low} to {high}{share}."
 
 
 def _scale(values: Curve, unit: str | None) -> Scale:

@@ -2,7 +2,7 @@
 
 import io
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
@@ -13,7 +13,7 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from jfsm.reporting._inspection_tables import consistency_table, inspected_channels_table, periods_table
-from jfsm.reporting._summary import key_answers
+from jfsm.reporting._summary import Answer, key_answers
 from jfsm.reporting._tables import (
     Table,
     candidates_table,
@@ -89,9 +89,9 @@ def _diagnosis(d: Mapping[str, Any], width: int) -> Group:
     title = Text(f" {verdict.label} ", style=f"bold {colour}")
     return Group(
         Panel(headline, title=title, title_align="left", border_style=colour, padding=(1, 2)),
-        _answers(d),
-        *(_rich_table(table) for table in _tables(d, width) if table.rows),
-        *_bullets("Notes", d.get("notes") or ()),
+        answer_grid(key_answers(d)),
+        *(rich_table(table) for table in _tables(d, width) if table.rows),
+        *bullets("Notes", d.get("notes") or ()),
     )
 
 
@@ -105,11 +105,12 @@ def _tables(d: Mapping[str, Any], width: int) -> Iterator[Table]:
     yield candidates if width >= WIDE else candidates.only(*ESSENTIAL)
 
 
-def _answers(d: Mapping[str, Any]) -> RenderableType:
+def answer_grid(answers: Iterable[Answer]) -> RenderableType:
+    """Answers under one another, each with what qualifies it."""
     grid = RichTable.grid(padding=(0, 2))
     grid.add_column(style="dim", no_wrap=True)
     grid.add_column()
-    for question, answer, details, _ in key_answers(d):
+    for question, answer, details, _ in answers:
         grid.add_row(question, Text.assemble((answer, "bold"), *(f"\n{line}" for line in details)))
     return Padding(grid, (0, 0, 1, 3))
 
@@ -128,12 +129,13 @@ def _inspection(d: Mapping[str, Any], width: int) -> Group:
     styles = ["yellow" if found["severity"] == "warning" else "" for found in findings]
     return Group(
         head,
-        *(_rich_table(table) for table in tables if table.rows),
-        *(_bullets("Remarks", remarks, styles) or [Text("Nothing odd was found.")]),
+        *(rich_table(table) for table in tables if table.rows),
+        *(bullets("Remarks", remarks, styles) or [Text("Nothing odd was found.")]),
     )
 
 
-def _rich_table(table: Table) -> RenderableType:
+def rich_table(table: Table) -> RenderableType:
+    """A table in the terminal."""
     # Cells are Text: brackets in a name are not markup.
     shown = RichTable(title=Text(table.title, style="bold"), title_justify="left", box=SIMPLE_HEAD)
     for column, heading in enumerate(table.headings):
@@ -149,7 +151,8 @@ def _rich_table(table: Table) -> RenderableType:
     return shown
 
 
-def _bullets(title: str, lines: Any, styles: Any = ()) -> list[RenderableType]:
+def bullets(title: str, lines: Any, styles: Any = ()) -> list[RenderableType]:
+    """Lines under a title; nothing where there are none."""
     if not lines:
         return []
     grid = RichTable.grid(padding=(0, 1))

@@ -1,43 +1,63 @@
-"""A structure as a TOML file."""
+"""A structure as a TOML file, its maps in files beside it."""
 
+import io
+import os
 import tomllib
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import tomli_w
 
-from ..reporting import write_text_atomically
+from ..reporting import write_atomically
 from ._sensors import SENSORS
-from .terms import TERMS
+from .terms import TERMS, MapTerm
 
 if TYPE_CHECKING:
     from ._structure import Structure
 
 
 def save(structure: "Structure", path: str | Path) -> None:
-    """Write `structure` to `path`; the file appears whole or not at all.
+    """Write `structure` to `path`, and each map beside it as ``<stem>.map.npz``; no file is left half written.
 
     Raises
     ------
     ValueError
-        If the structure holds a map: a map is its data, and TOML is for numbers that a person reads.
+        If a term holds a map that cannot be written: a function of yours, or one made of such.
     """
+    target = Path(path)
+    maps: dict[str | os.PathLike[str], bytes] = {}
     data: dict[str, Any] = {"mass": np.asarray(structure.mass).tolist()}
     if structure.trust:
         data["uncertain"] = dict(structure.trust)
     for key, parts in (("term", structure.terms), ("sensor", structure.sensors)):
         rows = []
         for part in parts:
-            if not part.parameters:
-                raise ValueError(
-                    f"A structure with a {part.kind} cannot be written as TOML; keep the record and fit the map again."
-                )
-            numbers = {p.name: float(getattr(part, p.name)) for p in part.parameters}
-            rows.append({"kind": part.kind, "at": list(part.at), **numbers})
+            row = {"kind": part.kind, "at": list(part.at)}
+            if isinstance(part, MapTerm):
+                beside = target.with_name(f"{target.stem}.map{len(maps) + 1 if maps else ''}.npz")
+                maps[beside] = _written(part)
+                rows.append({**row, "file": beside.name})
+            elif part.parameters:
+                rows.append({**row, **{p.name: float(getattr(part, p.name)) for p in part.parameters}})
+            else:
+                raise ValueError(f"A structure with a {part.kind} cannot be written as TOML: it has no numbers.")
         if rows:
             data[key] = rows
-    write_text_atomically(path, tomli_w.dumps(data))
+    write_atomically({**maps, target: tomli_w.dumps(data).encode()})
+
+
+def _written(term: MapTerm) -> bytes:
+    """The file of a map."""
+    if not hasattr(term.force_map, "save"):
+        raise ValueError(
+            f"A structure can be written if its maps are those of jfsm, such as RKPM.fit(states, force).on(at=(0, 1)); "
+            f"the map at {term.place} is {term.force_map!r}."
+        )
+    stream = io.BytesIO()
+    term.force_map.save(stream)
+    return stream.getvalue()
 
 
 def load(path: str | Path) -> "Structure":
@@ -46,10 +66,10 @@ def load(path: str | Path) -> "Structure":
     Raises
     ------
     FileNotFoundError
-        If there is no such file.
+        If there is no such file, or not the file of a map.
     ValueError
-        If the file is not TOML, lacks `mass`, or holds an unknown kind or parameter, or a value that cannot be;
-        names the entry.
+        If the file is not TOML, lacks `mass`, or holds an unknown kind or parameter, a value that cannot be, or a file
+        that is no map; names the entry.
     """
     from ._structure import Structure
 
@@ -66,8 +86,8 @@ def load(path: str | Path) -> "Structure":
     if "mass" not in data:
         raise ValueError(f"{target}: `mass` is missing; write e.g. mass = [1.0].")
     terms, sensors = (
-        [_part(row, classes, f"{target}, {key} {n}") for n, row in enumerate(_rows(data, key, target), 1)]
-        for key, classes in (("term", TERMS), ("sensor", SENSORS))
+        [_part(row, classes, target, f"{target}, {key} {n}") for n, row in enumerate(_rows(data, key, target), 1)]
+        for key, classes in (("term", (*TERMS, MapTerm)), ("sensor", SENSORS))
     )
     trust = data.get("uncertain", {})
     if not isinstance(trust, dict) or not all(type(share) in (int, float) for share in trust.values()):
@@ -85,16 +105,24 @@ def _rows(data: dict[str, Any], key: str, target: Path) -> list[dict[str, Any]]:
     return rows
 
 
-def _part(row: dict[str, Any], classes: tuple[type, ...], where: str) -> Any:
+def _part(row: dict[str, Any], classes: tuple[type, ...], target: Path, where: str) -> Any:
     kinds = {cls.kind: cls for cls in classes}
     row = dict(row)
     kind, at = row.pop("kind", None), row.pop("at", None)
     if kind not in kinds:
         raise ValueError(f"{where}: `kind` must be one of {', '.join(kinds)}; got {kind!r}.")
-    names = [p.name for p in kinds[kind].parameters]
+    names = ["file"] if kind == MapTerm.kind else [p.name for p in kinds[kind].parameters]
     if set(row) != set(names):
         raise ValueError(f"{where}: {kind} takes {', '.join(names)}; got {', '.join(row) or 'nothing'}.")
     try:
-        return kinds[kind](**row, at=at)
+        return _map(row["file"], target).on(at) if kind == MapTerm.kind else kinds[kind](**row, at=at)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{where}: {error}") from None
+
+
+def _map(file: Any, target: Path) -> Any:
+    """The map in a file beside the TOML."""
+    if not isinstance(file, str):
+        raise TypeError(f'`file` must name the file of a map, as file = "model.map.npz"; got {file!r}.')
+    # Maps live in a room below this one, and know this one: it is asked for by name, when there is a map to read.
+    return import_module("jfsm.surrogates").load_map(target.parent / file)

@@ -1,6 +1,7 @@
 """What the data say: force state maps, each a term without a formula."""
 
 from ._map import AbstractForceStateMap as AbstractForceStateMap
+from ._map_file import load_map as load_map
 from ._table import HermiteTable as HermiteTable
 from ._table import tabulate as tabulate
 from .discontinuities import Discontinuity as Discontinuity

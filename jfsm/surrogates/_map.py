@@ -2,7 +2,8 @@
 
 import abc
 from collections.abc import Sequence
-from typing import Any
+from pathlib import Path
+from typing import Any, BinaryIO
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -77,6 +78,18 @@ class AbstractForceStateMap(eqx.Module):
                 "Fit a map of the link's own motion."
             )
         return MapTerm(self, at=at)
+
+    def save(self, file: str | Path | BinaryIO) -> None:
+        """Write the map as an npz file, whole or not at all, or into a binary stream; `jfsm.load_map` reads it.
+
+        Raises
+        ------
+        ValueError
+            If a part of the map is no part of jfsm, such as an interface that is a function of yours.
+        """
+        from ._map_file import save_map
+
+        save_map(self, file)
 
     def _states(self, states: Any) -> NDArray[np.float64]:
         states = as_array(states, "states", 2)

@@ -1,6 +1,7 @@
 """A map of one displacement and one velocity frozen to a table, for simulation in constant time per call."""
 
-from typing import Any
+from pathlib import Path
+from typing import Any, BinaryIO
 
 import equinox as eqx
 import jax
@@ -45,6 +46,12 @@ class HermiteTable(eqx.Module):
     def on(self, at: tuple[int, int] = (0, 1)) -> MapTerm:
         """This table as a term of a structure, on the link `at`."""
         return MapTerm(self, at=at)
+
+    def save(self, file: str | Path | BinaryIO) -> None:
+        """Write the table as any map: an npz file that `jfsm.load_map` reads."""
+        from ._map_file import save_map
+
+        save_map(self, file)
 
 
 def _interpolate(
