@@ -112,9 +112,8 @@ def map_force(
     method : "rkpm" or "kriging"
         What learns the map.
     order : int, optional
-        Of an RKPM map the order of its polynomials, 2 or 3 by the readings when None (a map of order 1
-        cannot be simulated); of a kriging map that of its
-        trend, 2 when None.
+        Of an RKPM map the order of its polynomials, 2 or 3 by the readings when None (a map of order 1 cannot be
+        simulated); of a kriging map that of its trend, 2 when None.
 
     Returns
     -------
