@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 import jfsm
 from jfsm.cli import app
+from jfsm.diagnosis._clipped import limited
 from jfsm.dynamics._imposed import imposed_motion
 from jfsm.identification import Hypothesis, Posterior, nuisance_unknowns, prepare, with_offsets
 from jfsm.identification._unknowns import free_unknown
@@ -292,3 +293,10 @@ def test_what_makes_no_component_test_is_refused_with_the_reason():
         jfsm.fit(MODEL, [on_rig(LINEAR), driven])
     with pytest.raises(ValueError, match="a force or a moving base must drive"):
         jfsm.simulate_many(MODEL, record)
+
+
+def test_a_force_that_friction_holds_at_one_level_is_not_clipped():
+    record = jfsm.Record(T, 3.0 * np.clip(V / 2.0, -1.0, 1.0), X, drive="motion")
+    assert limited([record], MODEL) == []
+    driven = jfsm.Record(T, np.clip(3.0 * np.cos(T), -2.9, 2.9), X)
+    assert [(sensor.at, sensor.value) for sensor in limited([driven], MODEL)] == [(("force", 1), 2.9)]

@@ -20,10 +20,13 @@ _SAME = 1e-9
 
 
 def limited(records: Sequence[Record], model: Structure) -> list[Clipping]:
-    """The clipped channels of which the model knows nothing, with their limits; those cut off alike on both sides."""
+    """The clipped channels of which the model knows nothing, with their limits; those cut off alike on both sides.
+
+    Where a motion is imposed none is told: friction alone may hold the force at one level, and a rig its motion.
+    """
     known = {s.at for s in model.sensors if isinstance(s, Clipping)}
     found: dict[tuple[str, int], float] = {}
-    for record in records:
+    for record in (r for r in records if r.drive == "force"):
         for channel, samples in record.channels.items():
             cut = clipped(samples)
             size = float(np.max(np.abs(samples)))
