@@ -2,11 +2,14 @@
 
 import os
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import jax
 import pytest
 from jaxtyping import Array, Key
+
+MOST_MAPS = 25_000
 
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
@@ -19,6 +22,15 @@ def pytest_configure(config: pytest.Config) -> None:
         store = tempfile.TemporaryDirectory(prefix="jfsm-programs-")
         os.environ["JAX_COMPILATION_CACHE_DIR"] = store.name
         config.add_cleanup(store.cleanup)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def programs() -> Iterator[None]:
+    """Compiled programs go before they fill the process's table of memory maps: at 65 530 of them Linux ends it."""
+    yield
+    maps = Path("/proc/self/maps")
+    if maps.exists() and maps.read_bytes().count(b"\n") > MOST_MAPS:
+        jax.clear_caches()
 
 
 @pytest.fixture

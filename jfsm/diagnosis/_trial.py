@@ -96,10 +96,14 @@ def sets(nuisances: Nuisances, until: int) -> list[np.ndarray]:
     return [index * 4 // n == q for q in range(4)]
 
 
-def predict(posterior: Posterior, theta: np.ndarray) -> Prediction:
-    """Multi-step prediction of a hypothesis with one start; an offset that would be a cause explains nothing."""
-    slight = [u.path.startswith(("offset@force", "offset@acceleration")) for u in posterior.hypothesis.unknowns[0]]
-    theta = np.where(slight, np.clip(theta, -_SLIGHT, _SLIGHT), theta)
+def predict(posterior: Posterior, theta: np.ndarray, slight: bool = False) -> Prediction:
+    """Multi-step prediction of a hypothesis with one start.
+
+    With `slight` offsets what would be a cause of its own is not explained by an offset.
+    """
+    if slight:
+        mine = [u.path.startswith(("offset@force", "offset@acceleration")) for u in posterior.hypothesis.unknowns[0]]
+        theta = np.where(mine, np.clip(theta, -_SLIGHT, _SLIGHT), theta)
     best: list[tuple[float, Prediction]] = []
     for slack in _SLACKS:
         errors, expected, scatter = [], [], []
@@ -172,7 +176,7 @@ def trial(posterior: Posterior, maximum: Maximum, lane: int, cause: Cause | None
         value=float(maximum.value[lane]),
         rung=rung,
         converged=maximum.results[lane].ok,
-        prediction=predict(alone, theta),
+        prediction=predict(alone, theta, slight=cause is None),
         whiteness=whiteness(alone, theta),
         noise=scales,
         trusted=np.concatenate([n.trusted for n in posterior.records]),
