@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._threads import side_by_side
+from .._threads import compiled_once, side_by_side
 from ..identification import Nuisances, Posterior, Unknown, prior
 from ..structures import Structure
 from ._candidates import Candidate, hypothesis, modest
@@ -38,9 +38,8 @@ def also_detectable(
         start = modest(candidate, model, records[0])
         resolved = [n.resolving([start]) for n in records]
         posteriors.append(Posterior(hypothesis(model, [start], resolved), resolved, until))
-    compiling = {p.program: p for p in reversed(posteriors)}
     information = {}
-    for together in (list(compiling.values()), [p for p in posteriors if p is not compiling[p.program]]):
+    for together in compiled_once(posteriors):
         outcomes = side_by_side(lambda p: p.evaluate(p.initial())[2][0], together)
         information.update(zip(together, outcomes, strict=True))
     own, found = set(model.entries()), []

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .._threads import side_by_side
+from .._threads import compiled_once, side_by_side
 from ..identification import LANES, Maximum, Nuisances, Posterior, approach, finish, lanes_of, rungs
 from ..structures import Structure
 from ._candidates import Candidate, hypothesis
@@ -117,8 +117,7 @@ def search(
     values = refitted.structure.values()
     own = {p: values[p] for p in model.entries()} if refitted.evidence > given.evidence else None
     lots = [_Lot(beginnings, model, records, until) for beginnings in groups(tried, own)]
-    compiling = {lot.program: lot for lot in reversed(lots)}
-    for together in (compiling.values(), [lot for lot in lots if lot is not compiling[lot.program]]):
+    for together in compiled_once(lots):
         for lot in side_by_side(_Lot.step, together):
             tell(lot.label, 2 * len(lots))
     most = sorted((candidate.share or 0.0 for candidate in tried), reverse=True)[:_PROMISING]

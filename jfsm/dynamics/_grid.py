@@ -38,7 +38,7 @@ def punctual(plant: Plant, fine: Fine) -> Fine:
     if not plant.force_delay.size:
         return fine
     n, halves, dof = fine.force.shape
-    flat = jnp.concatenate([fine.force[:, :-1].reshape(n * (halves - 1), dof), fine.force[-1:, -1]])
+    flat = _in_a_row(fine.force)
     columns = [shifted(flat[:, j], plant.force_delay[j] / fine.step * (halves - 1)) for j in range(dof)]
     later = jnp.stack(columns, 1)
     take = jnp.arange(n)[:, None] * (halves - 1) + jnp.arange(halves)[None, :]
@@ -48,11 +48,15 @@ def punctual(plant: Plant, fine: Fine) -> Fine:
 def drive_before(fine: Fine, tau: Float[Array, ""]) -> tuple[Float[Array, "n 5 dof"], Float[Array, "n 5"]]:
     """Forces, and accelerations of the base, from each sample back to tau earlier: two steps in time, on half steps."""
     n, halves, dof = fine.force.shape
-    rows = jnp.concatenate([fine.force, fine.base[..., None]], 2)
-    flat = jnp.concatenate([rows[:, :-1].reshape(n * (halves - 1), dof + 1), rows[-1:, -1]])
+    flat = _in_a_row(jnp.concatenate([fine.force, fine.base[..., None]], 2))
     places = -tau / fine.step * (halves - 1) * jnp.linspace(0.0, 1.0, 5)
     earlier = jax.vmap(jax.vmap(shifted, (1, None), 1), (None, 0), 1)(flat, places)[: n * (halves - 1) : halves - 1]
     return earlier[..., :dof], earlier[..., dof]
+
+
+def _in_a_row(values: Float[Array, "n halves columns"]) -> Float[Array, "nodes columns"]:
+    """Values on the half steps of all samples one after the other, each instant once."""
+    return jnp.concatenate([values[:, :-1].reshape(-1, values.shape[2]), values[-1:, -1]])
 
 
 def shifted(values: Float[Array, " n"], places: Float[Array, ""]) -> Float[Array, " n"]:

@@ -162,10 +162,7 @@ def prepare(
         return _prepare_imposed(record, model, reconstruction)
     channels = tuple(record.responses)
     values = np.column_stack([record.responses[c] for c in channels])
-    spread = np.std(values, axis=0)
-    for channel, size in zip(channels, spread, strict=True):
-        if size == 0:
-            raise ValueError(f"`{channel[0]}` {channel[1]} is constant; leave a dead channel out of the record.")
+    spread = _spread(channels, values)
     use, floor, trusted, torn = _noise(channels, values, spread, record.dt)
     force, force_variance, share, words = _force(record, model)
     omega = fastest_mode(lower(model)) or _rate(values[:, 0], record.dt)
@@ -226,11 +223,9 @@ def _prepare_imposed(record: Record, model: Structure, reconstruction: Reconstru
     """Nuisances of a record whose motion is imposed: its readings are those of the force."""
     channels, path = tuple(record.channels), imposed_motion(record, model)
     values = np.column_stack([record.channels[c] for c in channels])
-    spread, floor, trusted, use = np.std(values, axis=0), *np.zeros((2, len(channels))), np.zeros_like(values)
+    spread, floor, trusted, use = _spread(channels, values), *np.zeros((2, len(channels))), np.zeros_like(values)
     notes = []
     for i, (kind, j) in enumerate(channels):
-        if spread[i] == 0:
-            raise ValueError(f"`{kind}` {j} is constant; leave a dead channel out of the record.")
         found = noise_floor(values[:, i], record.dt)
         trusted[i] = found.spacing > _FINEST
         floor[i] = max(noise_of(found, spread[i]), _LEAST_NOISE * spread[i])
@@ -272,6 +267,15 @@ def _prepare_imposed(record: Record, model: Structure, reconstruction: Reconstru
 def _mass(structure: Structure) -> np.ndarray:
     masses = np.asarray(structure.mass)
     return np.diag(masses) if masses.ndim == 1 else masses
+
+
+def _spread(channels: tuple[Channel, ...], values: np.ndarray) -> np.ndarray:
+    """Standard deviation of each channel; a dead one is refused."""
+    spread = np.std(values, axis=0)
+    for (kind, j), size in zip(channels, spread, strict=True):
+        if size == 0:
+            raise ValueError(f"`{kind}` {j} is constant; leave a dead channel out of the record.")
+    return spread
 
 
 def _noise(
