@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 
 import jfsm
 from jfsm.diagnosis._candidates import Candidate, promising
+from jfsm.diagnosis._effect import Effect
 from jfsm.identification import _likelihood
 
 MASS, STIFFNESS, DAMPING, CUBIC = 2.0, 18.0, 0.5, 4.0
@@ -168,6 +169,54 @@ def test_faults_of_the_measuring_chain_and_a_constant_force_are_named(cause, at,
     assert d.gain is not None and d.gain.after < d.gain.before
 
 
+def two_laws(x, v):
+    return duffing(x, v) + 0.5 * v * np.abs(v)
+
+
+@pytest.fixture(scope="module")
+def two_hidden(believed):
+    return jfsm.diagnose(made(two_laws), believed, causes=FEW, key=jax.random.key(0))
+
+
+def test_two_effects_are_both_named_without_their_number_being_told(two_hidden):
+    assert two_hidden.verdict == "cause"
+    found = {f.cause: f for f in two_hidden.findings}
+    assert set(found) == {"cubic_hardening", "quadratic_damping"}
+    for cause, name, truth in (("cubic_hardening", "k3", CUBIC), ("quadratic_damping", "c2", 0.5)):
+        [(only, estimate)] = found[cause].parameters.items()
+        assert only == name
+        assert abs(estimate.value - truth) < 4 * (estimate.high - estimate.low) / 3.92
+        assert found[cause].probability > 0.9
+    assert {"cubic_stiffness@0-1.k3", "quadratic_damping@0-1.c2"} <= set(two_hidden.extended.values())
+    assert two_hidden.gain.closed > 0.95
+
+
+def test_a_pair_shows_on_the_page_and_among_the_candidates(two_hidden, tmp_path):
+    named = [c for c in two_hidden.candidates if c.why == "named"]
+    assert [(c.cause, c.at) for c in named] == [("quadratic_damping + cubic_hardening", ((0, 1), (0, 1)))]
+    assert set(named[0].parameters) == {"quadratic_damping.c2", "cubic_hardening.k3"}
+    two_hidden.report(tmp_path / "d.html")
+    page = (tmp_path / "d.html").read_text()
+    assert "Cubic hardening + quadratic damping" in page or "Quadratic damping + cubic hardening" in page
+
+
+def test_a_spring_is_told_beside_a_gain_error_of_the_force(believed):
+    record = made(duffing)
+    read = {kind: y * (1.15 if kind == "force" else 1.0) for (kind, _), y in record.channels.items()}
+    again = jfsm.Record(record.time, **read, at_rest=True)  # pyright: ignore[reportArgumentType]
+    d = jfsm.diagnose(again, believed, causes=FEW, key=jax.random.key(0))
+    assert {f.cause for f in d.findings} == {"cubic_hardening", "force_gain"}
+    gain = next(f for f in d.findings if f.cause == "force_gain")
+    assert gain.at == ("force", 1)
+    assert gain.parameters["eps"].value == pytest.approx(0.15, abs=0.03)
+
+
+def test_no_second_effect_is_looked_for_where_one_is_asked_for(believed):
+    d = jfsm.diagnose(made(two_laws), believed, causes=FEW, max_causes=1, key=jax.random.key(0))
+    assert len(d.findings) < 2
+    assert not any("+" in c.cause for c in d.candidates)
+
+
 def test_a_law_that_is_not_looked_for_gets_no_name_and_a_map_that_runs():
     def stop(x, v):
         return linear(x, v) + 60.0 * np.maximum(x - 0.4, 0.0)
@@ -222,9 +271,10 @@ def test_records_without_response_or_too_short_are_refused(believed):
 
 def test_the_most_promising_laws_are_fitted_and_whatever_no_missing_force_tells_of():
     known, start = jfsm.causes(), jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING)
-    laws = [Candidate(known["coulomb"], (0, j), (start,), 0.01 * j) for j in range(12)]
-    nowhere = Candidate(known["jenkins"], (0, 1), (), 0.0)
-    untold = [Candidate(known["force_gain"], ("force", 1), (start,)), Candidate(known["preload"], (0, 1), (start,))]
+    laws = [Candidate((Effect(known["coulomb"], (0, j)),), (start,), 0.01 * j) for j in range(12)]
+    nowhere = Candidate((Effect(known["jenkins"], (0, 1)),), (), 0.0)
+    places = {"force_gain": ("force", 1), "preload": (0, 1)}
+    untold = [Candidate((Effect(known[name], at),), (start,)) for name, at in places.items()]
     followed, left_out = promising([*laws, nowhere, *untold])
     assert followed == [*laws[4:], *untold]
     assert left_out == [*laws[:4], nowhere]

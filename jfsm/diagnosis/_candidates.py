@@ -12,6 +12,7 @@ from ..identification import (
     DEGREES_BESIDE,
     Hypothesis,
     Nuisances,
+    Placed,
     Unknown,
     effect_unknown,
     lanes_of,
@@ -24,6 +25,7 @@ from ..identification import (
     with_offsets,
 )
 from ..structures import (
+    AbstractTerm,
     AccelerationBias,
     AccelerationGain,
     Cause,
@@ -34,6 +36,7 @@ from ..structures import (
     Structure,
     causes,
 )
+from ._effect import Effect
 
 _START, _START_AT_PEAK = 0.1, 0.3
 """First guess of an effect as a share of the elastic force, in the mean and at the largest displacement.
@@ -46,7 +49,7 @@ _START_LATE = 0.5
 
 _MODEST = 0.02
 """Size of an effect that nothing speaks for, as a share of the elastic force."""
-_SHAPES = 2
+SHAPES = 2
 """Starts of a law."""
 _FOLLOWED = 8
 """Laws that are fitted, the most promising ones."""
@@ -58,16 +61,17 @@ accelerometer shows beside the displacement."""
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A cause at a place; `starts` are the structures that a fit begins from.
+    """A cause at a place, or several at theirs; `starts` are the structures that a fit begins from.
 
     `share` is how much of the missing force the best of them explains by regression; None where regression cannot tell,
-    as of sensors, which lack no force. A law that no shape of which explains any has no starts.
+    as of sensors, which lack no force. A law that no shape of which explains any has no starts. `own` holds the model's
+    own values to begin with, where they are not tried as given.
     """
 
-    cause: Cause
-    at: tuple
+    effects: tuple[Effect, ...]
     starts: tuple[Structure, ...]
     share: float | None = None
+    own: Mapping[str, float] | None = None
 
 
 def chosen_causes(selection: Sequence[str | Cause] | None) -> dict[str, Cause]:
@@ -99,7 +103,7 @@ def candidates(
     places: Sequence[tuple] | None = None,
 ) -> list[Candidate]:
     """Every cause of `selection` at every place: link laws on the model's links, sensor effects on the channels."""
-    found, laws, imposed = [], _Laws(model, records[0]), records[0].path is not None
+    found, laws, imposed = [], Laws(model, records[0]), records[0].path is not None
     for cause in selection.values():
         if not any(p.free for p in cause.effect.parameters):
             continue  # nothing to fit: a clipped channel shows by itself
@@ -109,9 +113,9 @@ def candidates(
             channels = ("force",) if imposed else cause.effect.channels
             kinds = [kind for kind in channels if imposed or _shows(cause.effect, kind, records)]
             spots = dict.fromkeys(c for n in records for c in n.record.channels if c[0] in kinds)
-            found += [Candidate(cause, at, _natural_starts(model, cause, at, records[0])) for at in spots]
+            found += [Candidate((Effect(cause, at),), natural_starts(model, cause, at, records[0])) for at in spots]
         else:
-            found += [laws.candidate(cause, (i, j)) for i, j in (model.links if places is None else places)]
+            found += [laws.candidate(Effect(cause, (i, j))) for i, j in (model.links if places is None else places)]
     return found
 
 
@@ -123,24 +127,29 @@ def promising(tried: Sequence[Candidate]) -> tuple[list[Candidate], list[Candida
     return list(compress(tried, chosen)), list(compress(tried, [not c for c in chosen]))
 
 
-class _Laws:
-    """Laws as candidates, begun where they explain most of what the model lacks."""
+class Laws:
+    """Laws placed where they explain most of what a structure lacks."""
 
-    def __init__(self, model: Structure, nuisances: Nuisances):
-        self.model, self.nuisances, self.scale = model, nuisances, scale_of(nuisances, model)
+    def __init__(self, structure: Structure, nuisances: Nuisances):
+        self.structure, self.nuisances, self.scale = structure, nuisances, scale_of(nuisances, structure)
 
     @cached_property
     def missing(self) -> Latent:
-        return missing_force(self.model, self.nuisances)
+        return missing_force(self.structure, self.nuisances)
 
-    def candidate(self, cause: Cause, at: tuple[int, int]) -> Candidate:
-        law = cause.effect(**cause.effect.shapes(self.scale)[0], at=at)
-        placed = place(law, self.missing, self.model, self.scale, self.nuisances, sides=True, sign=cause.sign)
-        starts = [self.model + start.term for start in placed[:_SHAPES] if start.share is not None]
-        if len(cause.effect.parameters) == 1:  # has one shape; a missing force that is ill seen may not show its size
-            natural = _natural_starts(self.model, cause, at, self.nuisances)
-            starts += natural[: min(_SHAPES, lanes_of(natural[0])) - len(starts)]
-        return Candidate(cause, at, tuple(starts), placed[0].share if placed else 0.0)
+    def placed(self, effect: Effect, others: Sequence[AbstractTerm] = ()) -> list[Placed]:
+        """Shapes of a law that explain most; the sizes of `others`, which the structure has, are free beside it."""
+        kind, sign = effect.cause.effect, effect.cause.sign
+        law = kind(**kind.shapes(self.scale)[0], at=effect.at)
+        return place(law, self.missing, self.structure, self.scale, self.nuisances, others, sign, sides=True)
+
+    def candidate(self, effect: Effect) -> Candidate:
+        placed = self.placed(effect)
+        starts = [self.structure + start.term for start in placed[:SHAPES] if start.share is not None]
+        if len(effect.cause.effect.parameters) == 1:  # an ill seen missing force may not show its size
+            natural = natural_starts(self.structure, *effect, self.nuisances)
+            starts += natural[: min(SHAPES, lanes_of(natural[0])) - len(starts)]
+        return Candidate((effect,), tuple(starts), placed[0].share if placed else 0.0)
 
 
 def _shows(effect: type, kind: str, records: Sequence[Nuisances]) -> bool:
@@ -150,7 +159,8 @@ def _shows(effect: type, kind: str, records: Sequence[Nuisances]) -> bool:
     return effect is AccelerationBias or any(n.driven or any(c[0] != kind for c in n.channels) for n in records)
 
 
-def _natural_starts(model: Structure, cause: Cause, at: tuple, nuisances: Nuisances) -> tuple[Structure, ...]:
+def natural_starts(model: Structure, cause: Cause, at: tuple, nuisances: Nuisances) -> tuple[Structure, ...]:
+    """The model with the effect at natural sizes, of either sign where the cause has both."""
     structures = []
     parameter = cause.effect.parameters[0]
     # A law of degree n in the displacement weighs crest^(n - 1) times more at the largest displacement.
@@ -168,11 +178,11 @@ def _natural_starts(model: Structure, cause: Cause, at: tuple, nuisances: Nuisan
 
 def modest(candidate: Candidate, model: Structure, nuisances: Nuisances) -> Structure:
     """The model with a small effect of a law, of a natural shape."""
-    cause = candidate.cause
+    [(cause, at)] = candidate.effects
     shapes = cause.effect.shapes(scale_of(nuisances, model))
     shape = shapes[len(shapes) // 2]
     size = {p.name: _MODEST * (cause.sign or 1) if p.force else 1.0 for p in cause.effect.parameters}
-    return model + cause.effect(**{name: size[name] * value for name, value in shape.items()}, at=candidate.at)
+    return model + cause.effect(**{name: size[name] * value for name, value in shape.items()}, at=at)
 
 
 def own_paths(model: Structure, records: Sequence[Nuisances]) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..identification import prior
 from ..structures import AbstractTerm, LinearStiffness
 from ._trial import Trial
 
@@ -18,6 +19,10 @@ GATE = 0.5
 """Share of the excess power that a cause explains, at least."""
 SIGNIFICANT = 5.0
 """Nats by which something must beat nothing."""
+SECOND = 15.0
+"""Nats by which two effects must beat either of them alone,"""
+_WORTH_A_SECOND = 0.03
+"""and share of the refit's error by which they must predict better."""
 NEGLIGIBLE = 0.02
 """Excess, as a share of the signal, below which nothing but a perfect explanation is a finding."""
 _NOTICEABLE = 0.1
@@ -43,8 +48,8 @@ class Decision:
 
     @property
     def named_term(self) -> AbstractTerm | None:
-        """The winner's term, if a law was named."""
-        return self.winner.law if self.verdict == "cause" else None
+        """The winner's term, the first of them, if a law was named."""
+        return next(iter(self.winner.laws), None) if self.verdict == "cause" else None
 
     def share(self, trial: Trial) -> float:
         """Probability of a trial; 0 for one that is no alternative."""
@@ -55,6 +60,21 @@ def adequate(trial: Trial) -> bool:
     """Whether a trial leaves nothing but noise: white innovations of the size of the floor, no excess."""
     scales = np.abs(trial.noise[trial.trusted])
     return trial.whiteness < _WHITE and bool(np.all(scales < _SCALE)) and trial.prediction.left < NEGLIGIBLE
+
+
+def something_left(trials: Sequence[Trial]) -> bool:
+    """Whether the best of them leaves more than noise."""
+    return not adequate(max(trials, key=lambda t: t.evidence))
+
+
+def strained(trials: Sequence[Trial]) -> bool:
+    """Whether the best of them holds only with own values that are hard to believe."""
+    best = max(trials, key=lambda t: t.evidence)
+    cost = 0.0
+    for u, theta in zip(best.unknowns, best.theta, strict=True):
+        if math.isfinite(u.degrees):  # of an own value
+            cost += prior([u], np.array([theta]))[0] - prior([u], np.array([u.center]))[0]
+    return bool(best.effects) and cost > SIGNIFICANT
 
 
 def explained(trial: Trial, baseline: Trial) -> float:
@@ -99,7 +119,7 @@ def decide(
     passing = []
     for t in tried:
         kappa[id(t)] = explained(t, refitted)
-        why[id(t)] = _reason(t, given, refitted)
+        why[id(t)] = _reason(t, given, refitted) or _needs_both(t, tried, refitted)
         if not why[id(t)]:
             passing.append(t)
     alternatives = [given, refitted, *passing]
@@ -109,16 +129,11 @@ def decide(
     for t in passing:
         if t is not winner:
             why[id(t)] = "explains it too, but is less probable"
-    stands = imposed and winner.cause is not None and _almost_all(winner, refitted)
+    stands = imposed and bool(winner.effects) and _almost_all(winner, refitted)
     mapped = None if adequate(winner) or stands else stand_in(winner)
     verdict = _verdict(given, refitted, winner, tried, mapped)
     if verdict == "cause" and chance[id(winner)] < 0.5:
-        families = [
-            t
-            for t in passing
-            if t.cause is not None and winner.cause is not None and t.cause.family == winner.cause.family
-        ]
-        if sum(chance[id(t)] for t in families) < 0.8:
+        if sum(chance[id(t)] for t in passing if families(t) == families(winner)) < 0.8:
             verdict = "undecided"
     if verdict == "consistent":
         winner = given
@@ -128,9 +143,14 @@ def decide(
         winner = mapped if whole is None else whole
         mapped = winner
         kappa[id(mapped)] = explained(mapped, refitted)
-    elif verdict == "undecided" and winner.cause is not None:
+    elif verdict == "undecided" and winner.effects:
         winner = refitted
     return Decision(verdict, winner, chance, kappa, why)
+
+
+def families(t: Trial) -> list[str]:
+    """Families of a trial's causes."""
+    return sorted(effect.cause.family for effect in t.effects)
 
 
 def _almost_all(t: Trial, refitted: Trial) -> bool:
@@ -142,19 +162,36 @@ def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
     over_refit, over_given = explained(t, refitted), explained(t, given)
     if not math.isfinite(t.evidence) or over_refit == -math.inf:
         return "its motion runs away"
-    if (law := t.law) is not None:
+    for law in t.laws:
         springs = [s for s in t.structure.terms if isinstance(s, LinearStiffness) and set(s.at) == set(law.at)]
         if other := law.otherwise(sum(float(s.k) for s in springs)):
             return other
     # A gain error and own values that are all off by the same share predict the same readings: only what is believed
     # beforehand weighs them, so such a candidate need not beat the refit by a margin, nor leave less.
-    same = t.cause is not None and t.cause.is_sensor and adequate(t) and adequate(refitted)
+    same = not t.laws and adequate(t) and adequate(refitted)
     better = t.evidence - (given.evidence if same else max(given.evidence, refitted.evidence))
     if better <= SIGNIFICANT:
         return f"no more probable than the model {'as given' if same else 'refitted'}"
     if over_refit >= GATE or (adequate(t) and over_given >= GATE):
         return ""
     return f"explains {max(over_refit, 0.0):.0%} of what a refit leaves, less than half"
+
+
+def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
+    """Why a pair is no alternative to one of its effects alone, or nothing."""
+    size = np.sqrt(refitted.prediction.error)
+    for alone in tried:
+        if len(t.effects) == 1 or len(alone.effects) != 1 or alone.effects[0] not in t.effects:
+            continue
+        if adequate(t) and adequate(alone) and len(t.laws) < 2:  # own values tell a gain by what is believed of them
+            if t.evidence - alone.evidence <= SIGNIFICANT:
+                return f"{alone.effects[0].label} alone is about as probable"
+            continue
+        gained = np.sqrt(alone.prediction.excess) - np.sqrt(t.prediction.excess)
+        enough = explained(t, alone) >= GATE and bool(np.all(gained >= _WORTH_A_SECOND * size))
+        if not enough or t.evidence - alone.evidence <= SECOND:
+            return f"{alone.effects[0].label} alone explains it about as well"
+    return ""
 
 
 def _verdict(given: Trial, refitted: Trial, winner: Trial, tried: Sequence[Trial], mapped: Trial | None) -> str:
@@ -164,10 +201,10 @@ def _verdict(given: Trial, refitted: Trial, winner: Trial, tried: Sequence[Trial
     if given.prediction.left < NEGLIGIBLE and not clean:
         return "consistent"
     if clean:
-        return "parameters" if winner is refitted else "cause" if winner.cause else "consistent"
+        return "parameters" if winner is refitted else "cause" if winner.effects else "consistent"
     # No evidence for a map: it was fitted beforehand, and held-out samples judge it.
     stands_in = mapped is not None and explained(mapped, winner) >= GATE
-    if winner.cause is not None:
+    if winner.effects:
         # The nearest neighbour of a law that is not in the catalogue explains much of it, and leaves much.
         short = explained(winner, refitted) < _NEARLY_ALL and winner.prediction.left > _MUCH
         return "unnamed" if stands_in else "undecided" if short else "cause"

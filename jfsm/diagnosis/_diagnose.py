@@ -11,16 +11,17 @@ from .._types import require_x64
 from ..dynamics import Reconstruction
 from ..identification import Nuisances, prepare_all
 from ..records import Record
-from ..structures import Cause, Structure
+from ..structures import AccelerationGain, Cause, ForceGain, Structure
 from ._candidates import candidates, chosen_causes, promising
 from ._clipped import beside_clipping, limited
-from ._decide import decide
+from ._decide import decide, something_left, strained
 from ._detectable import also_detectable
 from ._diagnosis import Diagnosis
+from ._effect import Effect
 from ._gain import measure_gain
 from ._report import Tested, assemble
 from ._residual import residual, stand_in
-from ._search import fit_model, search
+from ._search import fit_model, search, search_pairs
 from ._trial import Trial
 
 _HEAVIER = 0.03
@@ -56,7 +57,8 @@ def diagnose(
         What to look for; the whole catalogue by default. Wrong own values always. Of many laws, those are fitted that
         explain most of the force that the model lacks.
     max_causes : int
-        Effects that may act at once, at most; a single one is looked for at present.
+        Effects that may act at once, at most. Two are looked for where any single one leaves more than noise; more than
+        two are not.
     key : jax.random.key, optional
         Source of the few draws (the floor of the gain); made at the call when None.
     places : sequence of links, optional
@@ -88,7 +90,8 @@ def diagnose(
     for sensor in clipped:
         model = model + sensor
     records = prepare_all(whole, model, reconstruction)
-    tried, left_out = promising(candidates(model, records, chosen, places))
+    every = candidates(model, records, chosen, places)
+    tried, left_out = promising(every)
     steps = _Steps(progress, 4)
 
     steps.next("the model as given")
@@ -101,6 +104,9 @@ def diagnose(
         given = fit_model("given", model, records, until, refit=False)
         refitted = fit_model("refitted", model, records, until, refit=True)
     trials = search(tried, model, given, refitted, records, until, steps.next)
+    if max_causes > 1:
+        effects = _beside([given, refitted, *trials], [effect for candidate in every for effect in candidate.effects])
+        trials += search_pairs(effects, trials, model, refitted, records, until, steps.next) if effects else []
     steps.next("the missing force")
     periods = sum(n.record.duration for n in records) * records[0].omega / (2 * math.pi)
     imposed = records[0].path is not None
@@ -127,6 +133,14 @@ def diagnose(
         unseen = also_detectable(left_out, model, records, until)
     tested = Tested(trials, left_out, unseen)
     return assemble(decision, clipped, refitted, tested, model, extended, records, missing, gain, runs)
+
+
+def _beside(trials: Sequence[Trial], effects: list[Effect]) -> list[Effect]:
+    """Effects that are worth a try beside another: all where something is left, gains where own values are strained."""
+    if something_left(trials):
+        return effects
+    gains = (ForceGain, AccelerationGain)
+    return [effect for effect in effects if effect.cause.effect in gains] if strained(trials) else []
 
 
 def _outweighed(model: Structure, refitted: Structure) -> bool:

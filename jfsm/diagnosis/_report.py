@@ -7,12 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..identification import Nuisances
-from ..structures import PARAMETER_CAUSES, Clipping, Structure, causes
+from ..structures import PARAMETER_CAUSES, Cause, Clipping, Structure, causes
 from ._candidates import Candidate
 from ._clipped import finding
 from ._decide import Decision
 from ._detectable import Unseen, detectable
 from ._diagnosis import CandidateResult, Diagnosis, Estimate, Finding, Rival
+from ._effect import Effect, names, places
 from ._gain import Gain
 from ._residual import Residual, curves
 from ._trial import Trial
@@ -53,7 +54,7 @@ def assemble(
         *(_candidate(t, decision, refitted, model, units) for t in sorted(trials, key=lambda t: -t.evidence)),
         *(_passed_over(c) for c in sorted(tested.left_out, key=lambda c: -(c.share or 0.0))),
     )
-    winner = decision.winner if decision.winner.at != ("given",) else refitted
+    winner = decision.winner if decision.winner.label != "given" else refitted
     refit = {
         p: _estimate(winner, p, model, units) for p in model.entries() if any(u.path == p for u in winner.unknowns)
     }
@@ -97,8 +98,9 @@ def _unit(structure: Structure, path: str, units) -> str:
 
 def _detectable(trials: list[Trial], others: Unseen, model: Structure, units) -> dict[str, tuple[str, Estimate]]:
     """Parameter and smallest size of every cause at the place where it would have shown first."""
-    sizes = [(t.name, t.structure, detectable(t, set(model.entries()))) for t in trials]
-    sizes += [(c.cause.id, structure, size) for c, structure, size in others]
+    single = [t for t in trials if len(t.effects) == 1]
+    sizes = [(t.name, t.structure, detectable(t, set(model.entries()))) for t in single]
+    sizes += [(names(c.effects), structure, size) for c, structure, size in others]
     found: dict[str, tuple[str, Estimate]] = {}
     for name, structure, size in sizes:
         if size is None or not math.isfinite(size[1]):
@@ -114,26 +116,47 @@ def _estimate(t: Trial, path: str, model: Structure, units) -> Estimate:
     return Estimate(value, low, high, _unit(t.structure, path, units))
 
 
-def _effect(t: Trial, model: Structure, units) -> dict[str, Estimate]:
-    own = set(model.entries())
-    paths = [u.path for u in t.unknowns if u.record is None and u.path not in own]
+def _values(t: Trial, which: int, model: Structure, units) -> dict[str, Estimate]:
+    """Values of one of a trial's effects, by name."""
+    own, part = set(model.entries()), t.parts[which]
+    paths = [u.path for u in t.unknowns if u.path.startswith(f"{part.kind}@{part.place}.") and u.path not in own]
     return {p.split(".")[-1].split("#")[0]: _estimate(t, p, model, units) for p in paths}
+
+
+def _all_values(t: Trial, model: Structure, units) -> dict[str, Estimate]:
+    """Values of all effects of a trial; of several, each with its cause before its name."""
+    if len(t.effects) == 1:
+        return _values(t, 0, model, units)
+    named = [(effect.cause.id, _values(t, i, model, units)) for i, effect in enumerate(t.effects)]
+    return {f"{cause}.{name}": estimate for cause, values in named for name, estimate in values.items()}
 
 
 def _findings(decision: Decision, trials: list[Trial], model: Structure, units) -> tuple[Finding, ...]:
     winner = decision.winner
-    if decision.verdict == "cause" and winner.cause is not None:
-        rivals = tuple(
-            Rival(t.name, t.at, decision.share(t))
-            for t in sorted(trials, key=decision.share, reverse=True)
-            if t is not winner and decision.share(t) > _RIVAL
-        )
-        parameters = _effect(winner, model, units)
-        cause = winner.cause
-        return (Finding(cause.id, cause.family, winner.at, decision.share(winner), parameters, rivals, cause.sentence),)
+    if decision.verdict == "cause" and winner.effects:
+        found = [_finding(which, decision, trials, model, units) for which in range(len(winner.effects))]
+        return tuple(sorted(found, key=lambda f: -f.probability))
     if decision.verdict == "parameters":
         return _wrong_values(winner, decision.share(winner), model, units)
     return ()
+
+
+def _finding(which: int, decision: Decision, trials: list[Trial], model: Structure, units) -> Finding:
+    """One effect of the winner; its rivals are what it may be instead, the winner's other effects aside."""
+    winner = decision.winner
+    effect = winner.effects[which]
+    probability, instead = 0.0, dict[Effect, float]()
+    for t in trials:
+        rest = set(t.effects) - set(winner.effects)
+        if effect in t.effects:
+            probability += decision.share(t)
+        elif len(rest) == 1:
+            rival = rest.pop()
+            instead[rival] = instead.get(rival, 0.0) + decision.share(t)
+    ranked = sorted(instead.items(), key=lambda item: -item[1])
+    rivals = tuple(Rival(r.cause.id, r.at, share) for r, share in ranked if share > _RIVAL)
+    cause, values = effect.cause, _values(winner, which, model, units)
+    return Finding(cause.id, cause.family, effect.at, probability, values, rivals, cause.sentence)
 
 
 def _wrong_values(t: Trial, probability: float, model: Structure, units) -> tuple[Finding, ...]:
@@ -171,14 +194,14 @@ def _candidate(t: Trial, decision: Decision, refitted: Trial, model: Structure, 
     why = decision.why.get(id(t), "") or ("named" if t is decision.winner else "")
     return CandidateResult(
         t.name, t.at, t.evidence - refitted.evidence, {n: float(e) for n, e in zip(names, error, strict=True)},
-        decision.kappa.get(id(t), 0.0), decision.share(t), _effect(t, model, units), why,
+        decision.kappa.get(id(t), 0.0), decision.share(t), _all_values(t, model, units), why,
     )  # fmt: skip
 
 
 def _passed_over(c: Candidate) -> CandidateResult:
     share = c.share or 0.0
     why = f"not fitted: explains {share:.0%} of the missing force, and other laws more"
-    return CandidateResult(c.cause.id, c.at, -math.inf, {}, share, 0.0, {}, why)
+    return CandidateResult(names(c.effects), places(c.effects), -math.inf, {}, share, 0.0, {}, why)
 
 
 def _words(decision: Decision, findings: tuple[Finding, ...], gain: Gain | None, *, imposed: bool) -> tuple[str, str]:
@@ -194,10 +217,9 @@ def _words(decision: Decision, findings: tuple[Finding, ...], gain: Gain | None,
         what = "; ".join(f.sentence for f in findings) or "its own values moved together"
         return f"The form of the model is right, its values are off: {what}.{share}", "Use the refitted values."
     if decision.verdict == "cause":
-        f = findings[0]
-        cause, where = decision.winner.cause or causes()["clipping"], "-".join(str(a) for a in f.at)
-        lacks = "The record shows" if cause.is_sensor else "The model lacks"
-        return f"{lacks} {cause.label} at {where}: {f.sentence}.{share}", "Use the extended model."
+        known = dict(causes()) | {e.cause.id: e.cause for e in decision.winner.effects}
+        said = " ".join(_said(f, known[f.cause]) for f in findings)
+        return f"{said}{share}", "Use the extended model."
     if decision.verdict == "unnamed":
         return (
             f"A real effect is there that no catalogue entry explains; a map stands in.{share}",
@@ -208,6 +230,13 @@ def _words(decision: Decision, findings: tuple[Finding, ...], gain: Gain | None,
         "Something is wrong beyond noise, and this record cannot tell what.",
         f"Record a second run with another amplitude, or {more}.",
     )
+
+
+def _said(finding: Finding, cause: Cause) -> str:
+    """A finding as a sentence."""
+    where = "-".join(map(str, finding.at))
+    lacks = "The record shows" if cause.is_sensor else "The model lacks"
+    return f"{lacks} {cause.label} at {where}: {finding.sentence}."
 
 
 def _record(records: list[Nuisances]) -> dict[str, Any]:

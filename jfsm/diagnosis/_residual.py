@@ -69,8 +69,8 @@ def stand_in(trial: Trial, records: list[Nuisances], until: list[int]) -> Trial 
     posterior = Posterior(Hypothesis((structure,), (trial.unknowns,)), records, until)
     return replace(
         trial,
-        cause=None,
-        at=("map", *found.at),
+        label="map",
+        effects=(),
         structure=structure,
         evidence=-math.inf,
         prediction=predict(posterior, trial.theta),

@@ -10,6 +10,9 @@ from .._threads import compiled_once, side_by_side
 from ..identification import LANES, Maximum, Nuisances, Posterior, approach, finish, lanes_of, rungs
 from ..structures import Structure
 from ._candidates import Candidate, hypothesis
+from ._decide import GATE, explained
+from ._effect import Effect
+from ._pairs import instead, pairs
 from ._trial import Trial, trial
 
 _LADDER = (0.3, 0.03, 0.01)
@@ -40,7 +43,7 @@ class _Lot:
             Posterior(hypothesis(model, starts[i : i + lanes], records, begins=begins[i : i + lanes]), records, until)
             for i in range(0, len(starts), lanes)
         ]
-        self.label = f"{candidates[0].cause.label} at {'-'.join(map(str, candidates[0].at))}"
+        self.label = " beside ".join(effect.label for effect in candidates[0].effects)
         self.share = max(math.inf if candidate.share is None else candidate.share for candidate in candidates)
         self.program, self.behind = posteriors[0].program, 0.0
         self.climb = self._climb(posteriors, candidates, lanes)
@@ -67,7 +70,7 @@ class _Lot:
         for one in dict.fromkeys(self.candidates):
             lanes = [lane for lane, candidate in enumerate(self.candidates) if candidate is one]
             lane = min(lanes, key=lambda lane: found.value[lane])
-            yield trial(self.posterior, found, lane, one.cause, one.at, float(self.rung.value[lane]))
+            yield trial(self.posterior, found, lane, float(self.rung.value[lane]), effects=one.effects)
 
 
 def fit_model(name: str, model: Structure, records: Sequence[Nuisances], until: Sequence[int], *, refit: bool) -> Trial:
@@ -82,7 +85,7 @@ def fit_model(name: str, model: Structure, records: Sequence[Nuisances], until: 
     theta = np.vstack([rung.theta[:1], posterior.initial()[1:]])
     found = finish(posterior, replace(rung, theta=theta))
     best = int(np.argmin(found.value))
-    return trial(posterior, found, best, None, (name,), float(rung.value[0]))
+    return trial(posterior, found, best, float(rung.value[0]), name)
 
 
 def groups(tried: Sequence[Candidate], own: Mapping[str, float] | None) -> list[list[Beginning]]:
@@ -94,9 +97,11 @@ def groups(tried: Sequence[Candidate], own: Mapping[str, float] | None) -> list[
     by_law: dict[tuple, list[Beginning]] = {}
     lots = []
     for candidate in tried:
-        begins = [None] if candidate.cause.is_sensor or own is None else [None, own]
+        gain = all(effect.cause.is_sensor for effect in candidate.effects)
+        begins = [candidate.own] if candidate.own or gain or own is None else [None, own]
         alone = lanes_of(candidate.starts[0]) == 1  # all starts of one candidate then, of which one climbs
-        lot = by_law.setdefault((candidate.cause.effect, candidate if alone else None), [])
+        law = tuple(effect.cause.effect for effect in candidate.effects)
+        lot = by_law.setdefault((law, candidate if alone else None), [])
         lot += [(candidate, s, begin) for begin in begins for s in candidate.starts]
     for (_, alone), lot in by_law.items():
         width = len(lot) if alone else LANES
@@ -117,31 +122,63 @@ def search(
     values = refitted.structure.values()
     own = {p: values[p] for p in model.entries()} if refitted.evidence > given.evidence else None
     lots = [_Lot(beginnings, model, records, until) for beginnings in groups(tried, own)]
+    most = sorted((candidate.share or 0.0 for candidate in tried), reverse=True)[:_PROMISING]
+    return _climbed(lots, [lot for lot in lots if lot.share > 0 and lot.share >= most[-1]], refitted, refitted, tell)
+
+
+def search_pairs(
+    effects: Sequence[Effect],
+    singles: Sequence[Trial],
+    model: Structure,
+    refitted: Trial,
+    records: Sequence[Nuisances],
+    until: Sequence[int],
+    tell: Callable[[str, int], None],
+) -> list[Trial]:
+    """The best trial of every pair tried: of good single causes, then those that share one with the best pair."""
+    best = min(singles, key=lambda t: t.value)
+
+    def climbed(tried: Sequence[Candidate]) -> list[Trial]:
+        lots = [_Lot(beginnings, model, records, until) for beginnings in groups(tried, None)]
+        return _climbed(lots, [], refitted, best, tell) if lots else []
+
+    found = climbed(pairs(singles, effects, model, records[0]))
+    leader = max(found, key=lambda t: t.evidence, default=best)
+    if explained(leader, best) < GATE:
+        return found
+    done = {frozenset(t.effects) for t in found}
+    near = instead(leader, effects, model, records[0])
+    return _best_of_each([*found, *climbed([c for c in near if frozenset(c.effects) not in done])])
+
+
+def _climbed(
+    lots: Sequence[_Lot], kept: Sequence[_Lot], refitted: Trial, best: Trial, tell: Callable[[str, int], None]
+) -> list[Trial]:
+    """All lots on their way up, the hopeless ones that are not `kept` only so far; `best` is known already."""
     for together in compiled_once(lots):
         for lot in side_by_side(_Lot.step, together):
             tell(lot.label, 2 * len(lots))
-    most = sorted((candidate.share or 0.0 for candidate in tried), reverse=True)[:_PROMISING]
     pursued = lots
     for _ in _LADDER[1:]:
         near = _near(pursued, max(_STILL_OPEN, len(pursued) // 2))
-        pursued = [lot for lot in pursued if lot in near or lot.share >= most[-1] > 0]
+        pursued = [lot for lot in pursued if lot in near or lot in kept]
         list(side_by_side(_Lot.step, pursued))
-    pursued = _near(pursued, _ALWAYS_PURSUED, refitted.rung)
+    pursued = _near(pursued, _ALWAYS_PURSUED, best.rung)
 
     def finished(lot: _Lot) -> list[Trial]:
         if lot in pursued:
-            return list(lot.trials(finish(lot.posterior, lot.rung, best=best)))
+            return list(lot.trials(finish(lot.posterior, lot.rung, best=leader)))
         found = lot.trials(lot.rung)
         return [replace(t, evidence=refitted.evidence - lot.behind, converged=False) for t in found]
 
     # The leader goes first: beside its top the others may be left where they are.
-    trials, best = [], refitted.value
+    trials, leader = [], best.value
     ranked = sorted(lots, key=lambda lot: lot.behind)
     for together in (ranked[:1], ranked[1:]):
         for found in side_by_side(finished, together):
             tell("the best candidates", 2 * len(lots))
             trials += found
-        best = min([best, *(t.value for t in trials)])
+        leader = min([leader, *(t.value for t in trials)])
     return _best_of_each(trials)
 
 
@@ -158,7 +195,6 @@ def _best_of_each(trials: Sequence[Trial]) -> list[Trial]:
     """The most probable start of every cause at every place."""
     best: dict[tuple, Trial] = {}
     for t in trials:
-        name = (t.name, t.at)
-        if name not in best or t.evidence > best[name].evidence:
-            best[name] = t
+        if t.effects not in best or t.evidence > best[t.effects].evidence:
+            best[t.effects] = t
     return list(best.values())

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..identification import Hypothesis, Maximum, Nuisances, Posterior, Unknown, without_small_offsets
-from ..structures import AbstractTerm, Cause, Structure
+from ..structures import AbstractSensor, AbstractTerm, Structure
+from ._effect import Effect, names, places
 
 _FILTERED, _PREDICTED = 2.0, 3.0
 """Periods of filtering before, and of free prediction in, every window."""
@@ -47,10 +48,10 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Trial:
-    """A hypothesis at its best values."""
+    """A hypothesis at its best values: the model with these effects; `label` says what it is where there are none."""
 
-    cause: Cause | None
-    at: tuple
+    label: str
+    effects: tuple[Effect, ...]
     structure: Structure
     unknowns: tuple[Unknown, ...]
     theta: np.ndarray
@@ -67,13 +68,30 @@ class Trial:
 
     @property
     def name(self) -> str:
-        """Cause id, or what the hypothesis is."""
-        return self.cause.id if self.cause else str(self.at[0])
+        """Cause ids, or what the hypothesis is."""
+        return names(self.effects) or self.label
 
     @property
-    def law(self) -> AbstractTerm | None:
-        """The term that a cause adds; None of a sensor's effect, and of what has no cause."""
-        return None if self.cause is None or self.cause.is_sensor else self.structure.terms[-1]
+    def at(self) -> tuple:
+        """Place of the effect; places of several."""
+        return places(self.effects)
+
+    @property
+    def parts(self) -> tuple[AbstractTerm | AbstractSensor, ...]:
+        """The terms and sensors that the effects add, in their order."""
+        count = sum(not effect.cause.is_sensor for effect in self.effects)
+        terms = iter(self.structure.terms[len(self.structure.terms) - count :])
+        return tuple(
+            next(s for s in self.structure.sensors if isinstance(s, effect.cause.effect) and s.at == effect.at)
+            if effect.cause.is_sensor
+            else next(terms)
+            for effect in self.effects
+        )
+
+    @property
+    def laws(self) -> tuple[AbstractTerm, ...]:
+        """The terms that the effects add; sensors add none."""
+        return tuple(part for part in self.parts if isinstance(part, AbstractTerm))
 
     def extended(self) -> Structure:
         """The structure without the offsets that are not significant."""
@@ -152,7 +170,9 @@ def whiteness(posterior: Posterior, theta: np.ndarray) -> float:
     return worst
 
 
-def trial(posterior: Posterior, maximum: Maximum, lane: int, cause: Cause | None, at: tuple, rung: float) -> Trial:
+def trial(
+    posterior: Posterior, maximum: Maximum, lane: int, rung: float, label: str = "", effects: tuple[Effect, ...] = ()
+) -> Trial:
     """The lane of a fit as a trial."""
     hypothesis = posterior.hypothesis
     alone = (
@@ -165,8 +185,8 @@ def trial(posterior: Posterior, maximum: Maximum, lane: int, cause: Cause | None
     theta, unknowns = maximum.theta[lane], hypothesis.unknowns[lane]
     scales = np.array([t for u, t in zip(unknowns, theta, strict=True) if u.path.startswith("noise@")])
     return Trial(
-        cause=cause,
-        at=at,
+        label=label,
+        effects=effects,
         structure=alone.structure(theta),
         unknowns=unknowns,
         theta=theta,
@@ -176,7 +196,7 @@ def trial(posterior: Posterior, maximum: Maximum, lane: int, cause: Cause | None
         value=float(maximum.value[lane]),
         rung=rung,
         converged=maximum.results[lane].ok,
-        prediction=predict(alone, theta, slight=cause is None),
+        prediction=predict(alone, theta, slight=not effects),
         whiteness=whiteness(alone, theta),
         noise=scales,
         trusted=np.concatenate([n.trusted for n in posterior.records]),

@@ -5,6 +5,7 @@ evaluated along the smoothed motion, and its size found by linear regression bes
 and the offsets. It is equation error, good for a start and for nothing more.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import compress
 from typing import NamedTuple
@@ -44,11 +45,13 @@ _MODEST = 0.05
 class Placed(NamedTuple):
     """A term, and the share that it explains of the power that springs and dashpots leave of a missing force.
 
-    None where constants, springs and dashpots make the same force, so that regression cannot tell.
+    None where constants, springs and dashpots make the same force, so that regression cannot tell. `left` is the mean
+    square force that it leaves.
     """
 
     term: AbstractTerm
     share: float | None
+    left: float
 
 
 def scale_of(nuisances: Nuisances, structure: Structure) -> Scale:
@@ -178,7 +181,7 @@ def place(
     columns = (forces / spread).reshape(len(rows), -1)
     left, beside_all, _, own = _regressed(columns, wanted, basis)
     if np.all(np.sum(own**2, 1) < _ALMOST_NONE * np.sum(columns**2, 1)):
-        return [Placed(law, None)]
+        return [Placed(law, None, math.inf)]
     # Springs and dashpots are known to some extent: without that, a law that is partly linear has no size of its own.
     noise = np.sqrt(_CORRELATED * max(np.min(left @ left - beside_all), 1e-12 * wanted.size) / wanted.size)
     ridge = np.diag(noise / doubt)
@@ -186,7 +189,10 @@ def place(
     left, gain, size, columns = _regressed(
         columns, np.concatenate([wanted, np.zeros(len(ridge))]), np.vstack([basis, ridge])
     )
-    power = np.maximum(np.sum(columns**2, 1), 1e-300)
+    power, power_left = (
+        np.maximum(np.sum(columns**2, 1), 1e-300),
+        float(left @ left / len(missing) * np.mean(spread**2)),
+    )
     one_sign = all(p.positive for p in kind.parameters if p.force)
     usable = power > 1e-12 * wanted.size
     usable &= (size > _LEAST) if one_sign else (np.abs(size) > _LEAST)
@@ -200,7 +206,8 @@ def place(
         if all(abs(shape @ other) < _ALIKE for other in kept):
             kept.append(shape)
             numbers = {p.name: rows[k][p.name] * (size[k] if p.force else 1.0) for p in kind.parameters}
-            found.append(Placed(kind(**numbers, at=law.at), float(gain[k] / (left @ left))))
+            share = float(gain[k] / (left @ left))
+            found.append(Placed(kind(**numbers, at=law.at), share, (1 - share) * power_left))
     return found
 
 

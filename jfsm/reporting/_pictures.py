@@ -111,5 +111,5 @@ def _sketches(d: Mapping[str, Any]) -> Iterator[Sketch]:
             "A cause has to explain the error on the left and to lead by evidence on the right.",
             describe_ranking(candidates),
             1.0 + 0.3 * ranked_size(candidates),
-            lambda figure: draw_ranking(figure, candidates, d.get("findings") or ()),
+            lambda figure: draw_ranking(figure, candidates),
         )

@@ -54,13 +54,10 @@ def _error(gain: Mapping[str, Any], stage: str) -> str:
     return f"{number(gain[stage] / scale.factor)} {scale.unit}".rstrip()
 
 
-def draw_ranking(
-    figure: FigureBase, candidates: Sequence[Mapping[str, Any]], named: Sequence[Mapping[str, Any]]
-) -> None:
+def draw_ranking(figure: FigureBase, candidates: Sequence[Mapping[str, Any]]) -> None:
     """The best candidates: how much of the error each explains, and how far its evidence lies behind the best."""
     best = _ranked(candidates)
-    chosen = {(finding["cause"], *(finding.get("at") or ())) for finding in named}
-    colours = [AFTER if (one["cause"], *(one.get("at") or ())) in chosen else FLOOR for one in best]
+    colours = [AFTER if one.get("why") == "named" else FLOOR for one in best]
     places = np.arange(len(best))
     explains = [100.0 * max(one.get("kappa") or 0.0, 0.0) for one in best]
     lead = best[0].get("evidence") or 0.0

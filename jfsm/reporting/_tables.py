@@ -96,9 +96,8 @@ def gain_table(channels: Mapping[str, Dictionary]) -> Table:
     return Table("Error on held-out data", headings, tuple(rows), _words(0, 1))
 
 
-def candidates_table(candidates: Sequence[Dictionary], named: Sequence[Dictionary] = ()) -> Table:
-    """Every hypothesis that was tried, in the order given; the named ones stand out."""
-    decided = {_key(finding) for finding in named}
+def candidates_table(candidates: Sequence[Dictionary]) -> Table:
+    """Every hypothesis that was tried, in the order given; the named one stands out."""
     sets = list(dict.fromkeys(name for candidate in candidates for name in candidate.get("error") or ()))
     rows = tuple(
         (
@@ -114,7 +113,7 @@ def candidates_table(candidates: Sequence[Dictionary], named: Sequence[Dictionar
     )
     errors = (f"error, {SETS.get(name, name)}" for name in sets)
     headings = ("cause", "place", "evidence [nats]", *errors, "explains", "probability", "why")
-    strong = frozenset(row for row, candidate in enumerate(candidates) if _key(candidate) in decided)
+    strong = frozenset(row for row, candidate in enumerate(candidates) if candidate.get("why") == "named")
     return Table("Candidates", headings, rows, _words(0, 1, len(headings) - 1), strong)
 
 
@@ -159,10 +158,6 @@ def _with_share(value: float | None, factor: float, share: float | None) -> str:
     if value is None:
         return ABSENT
     return f"{number(value / factor)} ({percent(share)})" if share is not None else number(value / factor)
-
-
-def _key(hypothesis: Dictionary) -> tuple[Any, ...]:
-    return (hypothesis["cause"], *(hypothesis.get("at") or ()))
 
 
 def _words(*columns: int) -> frozenset[int]:

@@ -101,7 +101,7 @@ def _tables(d: Mapping[str, Any], width: int) -> Iterator[Table]:
     yield rivals_table(findings)
     yield gain_table((d.get("gain") or {}).get("channels") or {})
     yield refitted_table(d.get("refitted") or {})
-    candidates = candidates_table((d.get("candidates") or ())[:MOST_CANDIDATES], findings)
+    candidates = candidates_table((d.get("candidates") or ())[:MOST_CANDIDATES])
     yield candidates if width >= WIDE else candidates.only(*ESSENTIAL)
 
 

@@ -60,8 +60,8 @@ def checked_verdict(d: Mapping[str, Any]) -> Verdict:
 
 
 def cause_name(cause: str) -> str:
-    """A cause's id in words: "cubic hardening"; ids outside the catalogue lose their underscores."""
-    return PROPER.get(cause, cause.replace("_", " "))
+    """A cause's id in words: "cubic hardening"; several stay a sum, ids outside the catalogue lose their "_"."""
+    return " + ".join(PROPER.get(one, one.replace("_", " ")) for one in cause.split(" + "))
 
 
 def place_name(at: Sequence[Any] | None) -> str:
@@ -73,6 +73,8 @@ def place_name(at: Sequence[Any] | None) -> str:
             return " ".join([kind.replace("_", " "), "channel", *map(str, rest)])
         case [single]:
             return f"mass {single}"
+        case [[*_], *_] as several:
+            return ", ".join(dict.fromkeys(map(place_name, several)))
         case ends:
             return "link " + "–".join("ground" if end == 0 else str(end) for end in ends)
 

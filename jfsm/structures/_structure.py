@@ -171,12 +171,13 @@ class Structure(eqx.Module):
             return Structure(self.mass, self.terms, (*self.sensors, other), self.trust)
         return NotImplemented
 
-    def without(self, term: AbstractTerm) -> "Structure":
-        """The structure less one of its terms."""
-        kept = [t for t in self.terms if t is not term]
-        if len(kept) == len(self.terms):
-            raise ValueError(f"`term` must be one of the structure's own terms; got {term!r}.")
-        return Structure(self.mass, kept, self.sensors, self.trust)
+    def without(self, part: AbstractTerm | AbstractSensor) -> "Structure":
+        """The structure less one of its terms or sensors."""
+        terms = [term for term in self.terms if term is not part]
+        sensors = [sensor for sensor in self.sensors if sensor is not part]
+        if len(terms) + len(sensors) == len(self.terms) + len(self.sensors):
+            raise ValueError(f"`part` must be one of the structure's own terms or sensors; got {part!r}.")
+        return Structure(self.mass, terms, sensors, self.trust)
 
     def uncertain(self, **relative: float) -> "Structure":
         """The same structure with stated trust: ``uncertain(stiffness=0.05)`` says stiffnesses are right to 5 %."""

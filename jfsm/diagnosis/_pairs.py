@@ -1,0 +1,110 @@
+"""Two effects at once, where one leaves something: not the best one and then the next, but pairs of good ones."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ..identification import Nuisances
+from ..structures import AbstractSensor, AbstractTerm, CubicStiffness, QuadraticStiffness, Structure
+from ._candidates import SHAPES, Candidate, Laws, natural_starts
+from ._effect import Effect
+from ._trial import Trial
+
+_BASES = 5
+"""Causes beside which a second one is looked for, at most: the best of each family."""
+_BESIDE = 2
+"""Laws that are tried beside each, those that explain most of what it leaves,"""
+_PAIRS = 6
+"""and of these pairs those that leave least."""
+_WITH_UNTOLD = 2
+"""Bases beside which effects are tried that no missing force tells of, sensors' faults before all."""
+_INSTEAD = 5
+"""Laws that are tried instead of either effect of the best pair."""
+_ONE_SPRING = {QuadraticStiffness, CubicStiffness}
+"""Laws of one family that are two effects all the same: the parts of an asymmetric spring."""
+
+
+class _Pair(NamedTuple):
+    """A pair to be tried, and the mean square force that it leaves; none is known where no missing force tells."""
+
+    candidate: Candidate
+    left: float | None
+
+
+def pairs(
+    singles: Sequence[Trial], effects: Sequence[Effect], model: Structure, nuisances: Nuisances
+) -> list[Candidate]:
+    """Pairs to be tried, from what single causes explain and what they leave."""
+    found: list[_Pair] = []
+    families: list[str] = []
+    for base in sorted(singles, key=lambda t: -t.evidence):
+        family = base.effects[0].cause.family
+        if family in families or len(families) == _BASES:
+            continue
+        families.append(family)
+        beside = _beside(base, base.structure, 0, effects, model, nuisances)
+        if len(families) <= _WITH_UNTOLD:
+            found += [pair for pair in beside if pair.left is None]
+        found += _best(beside, _BESIDE)
+    return [pair.candidate for pair in found if pair.left is None] + [pair.candidate for pair in _best(found, _PAIRS)]
+
+
+def instead(pair: Trial, effects: Sequence[Effect], model: Structure, nuisances: Nuisances) -> list[Candidate]:
+    """Pairs that share an effect with one that was found, its neighbours."""
+    found = []
+    for kept, changed in ((0, 1), (1, 0)):
+        rest = pair.structure.without(pair.parts[changed])
+        beside = _beside(pair, rest, kept, effects, model, nuisances)
+        if pair.effects[changed].cause.is_sensor:
+            found += [one.candidate for one in beside if one.left is None]
+        found += [one.candidate for one in _best(beside, _INSTEAD)]
+    return [c for c in found if set(c.effects) != set(pair.effects)]
+
+
+def _best(found: Sequence[_Pair], most: int) -> list[_Pair]:
+    """Those that leave least of a missing force."""
+    told = [(pair.left, i) for i, pair in enumerate(found) if pair.left is not None]
+    return [found[i] for _, i in sorted(told)[:most]]
+
+
+def _beside(
+    base: Trial, structure: Structure, kept: int, effects: Sequence[Effect], model: Structure, nuisances: Nuisances
+) -> list[_Pair]:
+    """Pairs of one effect of a trial, which `structure` has, with every other."""
+    effect, part = base.effects[kept], base.parts[kept]
+    laws, others = Laws(structure, nuisances), [part] if isinstance(part, AbstractTerm) else []
+    values = structure.values()
+    own = {path: values[path] for path in model.entries()}
+    found = []
+    for other in effects:
+        if not _are_two(effect, other):
+            continue
+        if other.cause.is_sensor:
+            starts, left = natural_starts(model + part, *other, nuisances), None
+        else:
+            placed = laws.placed(other, others)[:SHAPES]
+            starts = tuple(_both(model, effect, part, other, start.term) for start in placed)
+            left = placed[0].left if placed and placed[0].share is not None else None
+        if starts:
+            in_order = (effect, other) if _in_order(effect, other) else (other, effect)
+            # A gain lies on a ridge with the own values: it begins at those as given, and at their end of it.
+            found.append(_Pair(Candidate(in_order, starts, own=None if other.cause.is_sensor else own), left))
+    return found
+
+
+def _are_two(one: Effect, other: Effect) -> bool:
+    """Whether they are two effects, not two forms of one: of different families, or at different places."""
+    if one.cause.is_sensor and other.cause.is_sensor:
+        return False
+    if one.cause.family != other.cause.family or one.at != other.at:
+        return True
+    return {one.cause.effect, other.cause.effect} == _ONE_SPRING
+
+
+def _in_order(one: Effect, other: Effect) -> bool:
+    return (one.cause.family, one.cause.id, one.at) <= (other.cause.family, other.cause.id, other.at)
+
+
+def _both(
+    model: Structure, one: Effect, part: AbstractTerm | AbstractSensor, other: Effect, law: AbstractTerm
+) -> Structure:
+    return model + part + law if _in_order(one, other) else model + law + part
