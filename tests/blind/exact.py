@@ -55,7 +55,7 @@ def integrate(
     while done < time.size:
         until = stops[bisect.bisect_right(stops, here, hi=len(stops) - 1)]
         if law.holds(mode):
-            phase = run.held(here, state, time[done:])
+            phase = run.held(mode, here, until, state, time[done:])
         else:
             phase = run.moving(mode, here, until, state, time[done:])
         piece = time[done : done + phase.y.shape[1]]
@@ -73,9 +73,9 @@ def integrate(
             )
         if done < time.size:
             if phase.exit is None:
-                following = law.mode_after_stop(mode)
+                following = law.mode_after_stop(mode, here)
             else:
-                following = law.next_mode(mode, phase.exit, float(run.load(here, *state[:2])))
+                following = law.next_mode(mode, phase.exit, float(run.load_to_hold(here, state, mode)))
             if phase.exit is not None or following != mode:
                 instants.append(here)
             mode = following
@@ -122,7 +122,9 @@ class _Run:
         reach: float,
     ):  # fmt: skip
         self.plant, self.law, self.drive, self.rtol, self.reach = plant, law, drive, rtol, reach
-        self.watch = float(time[1] - time[0]) / WATCHES_PER_SAMPLE
+        # The samples may be uneven, and the first two next to one another.
+        step = max(time[1] - time[0], 0.5 * (time[-1] - time[0]) / time.size)
+        self.watch = float(step) / WATCHES_PER_SAMPLE
         sizes = {"displacement": scale, "velocity": plant.omega * scale}
         self.sizes = sizes
         self.atol = rtol * np.array([sizes[kind] for kind in ("displacement", "velocity", *law.hidden)])
@@ -132,11 +134,17 @@ class _Run:
     def load(self, t, x, v):
         return self.drive(t) - self.plant.damping * v - self.plant.stiffness * x
 
+    def load_to_hold(self, t: Any, y: FloatArray, mode: Mode) -> Any:
+        """What a law that holds the mass has to hold at t, in the states y (states,) or along (states, n) [N]."""
+        x, v = y[:2]
+        return self.law.load_to_hold(x, v, self.remembered(t, y), t, self.load(t, x, v), mode)
+
     def remembered(self, t: Any, y: FloatArray) -> Hidden:
         """What the law remembers at t, in the states y (states,) or along (states, n)."""
         if not self.law.delay:
             return tuple(y[2:])
-        return (np.array([self.past(s) for s in np.ravel(t - self.law.delay).tolist()]).reshape(np.shape(t)),)
+        late = np.array([self.past(s) for s in np.ravel(t - self.law.delay).tolist()]).reshape(np.shape(t))
+        return *y[2:], late
 
     def _rates(self, mode: Mode) -> Callable[[float, FloatArray], Sequence[float]]:
         """Right-hand side within a mode."""
@@ -155,9 +163,10 @@ class _Run:
             return v, (load - force(x, v, z, t, load, mode)) / m, *hidden_rates(x, v, z, mode)
 
         def with_delay(t: float, y: FloatArray) -> Sequence[float]:
-            x, v = y.tolist()
+            x, v, *z = y.tolist()
+            z.append(past(t - delay))
             load = float(drive(t)) - c * v - k * x
-            return v, (load - force(x, v, (past(t - delay),), t, load, mode)) / m
+            return v, (load - force(x, v, z, t, load, mode)) / m, *hidden_rates(x, v, z, mode)
 
         return with_delay if delay else with_memory if self.law.hidden else rates
 
@@ -195,10 +204,10 @@ class _Run:
                 after = self._guards(mode, solver.y.tolist())
                 crossing = self._crossing(mode, step, begin, end, before, after)
                 before = after
-            if self.law.delay:
-                self.past.append(end, step)
             if crossing:
                 end = crossing[0]
+            if self.law.delay:
+                self.past.append(end, step)
             passed = int(np.searchsorted(time, end, side="right"))
             if passed > done:
                 samples.append(step(time[done:passed]))
@@ -231,15 +240,20 @@ class _Run:
                 crossings.append((float(root), which))  # pyright: ignore[reportArgumentType]
         return min(crossings, default=None)
 
-    def held(self, here: float, state: FloatArray, time: FloatArray) -> _Phase:
-        x, last = float(state[0]), float(time[-1])
+    def held(self, mode: Mode, here: float, until: float, state: FloatArray, time: FloatArray) -> _Phase:
+        x, z = float(state[0]), state[2:]
+
+        def still(t):
+            """States (states, n) while the mass is held."""
+            hidden = self.law.hidden_at_rest(x, z, t - here)
+            return np.array([np.broadcast_to(y, np.shape(t)) for y in (x, 0.0, *hidden)])
 
         def margin(t):
-            return self.law.release(self.load(t, x, 0.0))
+            return self.law.release(self.load_to_hold(t, still(t), mode))
 
-        end, left, looks, let_go = last, here, 64, None
-        while left < last:
-            grid = np.minimum(left + self.watch * np.arange(looks + 1), last)
+        end, left, looks, let_go = until, here, 64, None
+        while left < until:
+            grid = np.minimum(left + self.watch * np.arange(looks + 1), until)
             loose = np.flatnonzero(margin(grid) < 0.0)
             if loose.size and loose[0] == 0:  # held at the first look only by rounding
                 end, let_go = here, -1
@@ -250,8 +264,10 @@ class _Run:
                 let_go = -1
                 break
             left, looks = float(grid[-1]), min(2 * looks, 1024)
+        if self.law.delay:
+            self.past.append(end, still)
         samples = int(np.searchsorted(time, end, side="right"))
-        return _Phase(np.array([[x], [0.0]]).repeat(samples, axis=1), end, np.array([x, 0.0]), let_go)
+        return _Phase(still(time[:samples]), end, still(end), let_go)
 
 
 def _joined(samples: Sequence[FloatArray], states: int) -> FloatArray:

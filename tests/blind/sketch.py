@@ -1,5 +1,7 @@
 """A quick sketch of a plant's motion, good for choosing the size of an effect."""
 
+from typing import Any
+
 import numpy as np
 
 from .arrays import FloatArray
@@ -28,48 +30,44 @@ def sketch(plant: Plant, law: Law, drive: Drive, start: State, time: FloatArray,
     force, hidden_rates, first_mode, confined = law.force, law.hidden_rates, law.first_mode, law.confined
     delay, past = law.delay / dt, []
 
-    def delayed(steps: float) -> float:
-        """x at so many steps from the start, between or just beyond the points so far."""
+    def late(steps: float) -> tuple[float, ...]:
+        """What a law with a delay remembers at so many steps from the start: x, between or beyond the points so far."""
+        if not delay:
+            return ()
         at = min(max(steps - delay, 0.0), len(past) - 1.0)
         i = int(at)
-        return past[i] if i + 1 == len(past) else past[i] + (at - i) * (past[i + 1] - past[i])
+        return (past[i] if i + 1 == len(past) else past[i] + (at - i) * (past[i + 1] - past[i]),)
 
     def rates(t: float, g: float, x: float, v: float, z: Hidden) -> tuple[float, Hidden]:
         load = g - c * v - k * x
         mode = first_mode(x, v, z, t, load)
         return (load - force(x, v, z, t, load, mode)) / m, hidden_rates(x, v, z, mode)
 
-    def moved(z: Hidden, h: float, rate: Hidden) -> Hidden:
-        return confined(tuple(a + h * b for a, b in zip(z, rate, strict=True))) if z else z
+    def moved(z: tuple[Any, ...], h: float, rate: Hidden) -> tuple[Any, ...]:
+        return tuple(confined(tuple(a + h * b for a, b in zip(z, rate, strict=True)))) if z else z
 
     x, v = start
-    z = law.hidden_start(x, v)
+    z = tuple(law.hidden_start(x, v))
     rows = []
     for i in range(time.size):
         t, middle, end = times[i], times[i] + 0.5 * dt, times[i] + dt
-        z2 = z3 = z4 = z
         if delay:
             past.append(x)
-            z = (delayed(i),)
-            z2 = z3 = (delayed(i + 0.5),)
-            z4 = (delayed(i + 1.0),)
-        a1, r1 = rates(t, whole[i], x, v, z)
-        rows.append((x, v, a1))
+        late1, late2, late4 = late(i), late(i + 0.5), late(i + 1.0)
+        a1, r1 = rates(t, whole[i], x, v, z + late1)
+        rows.append((x, v, a1, *z, *late1))
         v2 = v + 0.5 * dt * a1
-        z2 = z2 if delay else moved(z, 0.5 * dt, r1)
-        a2, r2 = rates(middle, half[i], x + 0.5 * dt * v, v2, z2)
+        a2, r2 = rates(middle, half[i], x + 0.5 * dt * v, v2, moved(z, 0.5 * dt, r1) + late2)
         v3 = v + 0.5 * dt * a2
-        z3 = z3 if delay else moved(z, 0.5 * dt, r2)
-        a3, r3 = rates(middle, half[i], x + 0.5 * dt * v2, v3, z3)
+        a3, r3 = rates(middle, half[i], x + 0.5 * dt * v2, v3, moved(z, 0.5 * dt, r2) + late2)
         v4 = v + dt * a3
-        z4 = z4 if delay else moved(z, dt, r3)
-        a4, r4 = rates(end, whole[i + 1], x + dt * v3, v4, z4)
+        a4, r4 = rates(end, whole[i + 1], x + dt * v3, v4, moved(z, dt, r3) + late4)
         x += dt / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4)
         v += dt / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
-        if z and not delay:
+        if z:
             z = moved(z, dt / 6.0, tuple(p + 2.0 * q + 2.0 * r + s for p, q, r, s in zip(r1, r2, r3, r4, strict=True)))
         if not abs(x) <= reach:
             raise EscapeError("the sketched motion passes the law's reach")
-    xs, vs, accelerations = np.array(rows).T
+    xs, vs, accelerations, *hidden = np.array(rows).T
     effect = np.array(whole[:-1]) - c * vs - k * xs - m * accelerations
-    return Motion(time, xs, vs, accelerations, effect, np.empty(0))
+    return Motion(time, xs, vs, accelerations, effect, np.empty(0), tuple(hidden))

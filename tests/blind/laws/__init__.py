@@ -3,6 +3,7 @@
 from .base import Law as Law
 from .base import NoLaw as NoLaw
 from .base import Scene as Scene
+from .both import Both as Both
 from .damping import (
     BilinearDamping,
     Coulomb,

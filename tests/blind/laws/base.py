@@ -73,6 +73,7 @@ class Law(abc.ABC):
     sized: ClassVar[bool] = True  # whether `scaled` brings its force to a share that was drawn
     chaotic: ClassVar[bool] = False  # whether motions under it may part exponentially
     creeps: ClassVar[bool] = False  # whether its slope at rest is infinite, so that a mass may come near rest and creep
+    dry: ClassVar[bool] = False  # whether it, or its twin, may hold the mass still
 
     @property
     def delay(self) -> float:
@@ -125,6 +126,10 @@ class Law(abc.ABC):
         """Rates of the hidden states inside a mode."""
         return ()
 
+    def hidden_at_rest(self, x: float, z: Hidden, elapsed: Any) -> Hidden:
+        """Hidden states `elapsed` [s], (n,) or one, after they were `z`, the mass held at x [m] since."""
+        return z
+
     def confined(self, z: Hidden) -> Hidden:
         """Hidden states put back within their bounds, for a stepper that is blind to the ends of modes."""
         return z
@@ -144,7 +149,7 @@ class Law(abc.ABC):
         return ()
 
     def next_mode(self, mode: Mode, which: int, load: float) -> Mode:
-        """The mode that follows under `load` [N] where guard number `which` of `mode` has come to zero.
+        """The mode that follows under a `load_to_hold` [N] where guard number `which` of `mode` has come to zero.
 
         The guards are counted velocities first; `which` is -1 where a mass that was held is let go.
         """
@@ -154,8 +159,12 @@ class Law(abc.ABC):
         """Whether the mass is held still in this mode."""
         return False
 
+    def load_to_hold(self, x: Any, v: Any, z: Hidden, t: Any, load: Any, mode: Mode) -> Any:
+        """What of `load` [N] is left to a law that holds the mass: all of it, unless another force acts beside it."""
+        return load
+
     def release(self, load: FloatArray) -> FloatArray:
-        """Positive while a held mass stays, (n,) [N], for loads (n,) [N]."""
+        """Positive while a held mass stays, (n,) [N], for a `load_to_hold` (n,) [N]."""
         raise NotImplementedError(f"{type(self).__name__} holds the mass and must say when it lets go")
 
     # time
@@ -164,8 +173,8 @@ class Law(abc.ABC):
         """Instants [s] between `begin` and `end` that no step of an integrator may pass over, (stops,), ascending."""
         return np.empty(0)
 
-    def mode_after_stop(self, mode: Mode) -> Mode:
-        """The mode from a stop on."""
+    def mode_after_stop(self, mode: Mode, t: float) -> Mode:
+        """The mode from a stop at t [s] on; it need not be one of this law's own."""
         return mode
 
 

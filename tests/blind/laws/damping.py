@@ -42,6 +42,7 @@ class DryFriction(Law):
     """A force against the motion; at v = 0 the mass sticks for as long as the load stays within the limits."""
 
     smooth: ClassVar[bool] = False
+    dry: ClassVar[bool] = True
 
     @property
     def limits(self) -> tuple[float, float]:

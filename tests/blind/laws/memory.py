@@ -178,6 +178,7 @@ class LuGre(KinkedLaw):
     """
 
     cause: ClassVar[str] = "lugre"
+    dry: ClassVar[bool] = True  # its twin is
     slack: ClassVar[float] = 1e-11  # its swings die out, and those left by the integrator's rounding need no events
     hidden: ClassVar[tuple[Literal["displacement", "velocity"], ...]] = ("displacement",)
     F: float
@@ -242,6 +243,9 @@ class Maxwell(Law):
     def hidden_rates(self, x: Any, v: Any, z: Hidden, mode: Mode) -> Hidden:
         return (v - z[0] / self.tau,)
 
+    def hidden_at_rest(self, x: float, z: Hidden, elapsed: Any) -> Hidden:
+        return (z[0] * np.exp(-elapsed / self.tau),)
+
 
 @dataclasses.dataclass(frozen=True)
 class AttachedOscillator(Law):
@@ -278,6 +282,16 @@ class AttachedOscillator(Law):
 
     def hidden_rates(self, x: Any, v: Any, z: Hidden, mode: Mode) -> Hidden:
         return (z[1], self.omega * (self.omega * (x - z[0]) + 2.0 * self.zeta * (v - z[1])))
+
+    def hidden_at_rest(self, x: float, z: Hidden, elapsed: Any) -> Hidden:
+        """A free decay about x."""
+        decay, stretch, rate = self.zeta * self.omega, z[0] - x, z[1]
+        omega = self.omega * np.sqrt(1.0 - self.zeta**2)
+        size, cos, sin = np.exp(-decay * elapsed), np.cos(omega * elapsed), np.sin(omega * elapsed) / omega
+        return (
+            x + size * (stretch * cos + (rate + decay * stretch) * sin),
+            size * (rate * cos - (decay * rate + self.omega**2 * stretch) * sin),
+        )
 
 
 @dataclasses.dataclass(frozen=True)

@@ -91,8 +91,8 @@ class StiffnessDrop(Law):
     def stops(self, begin: float, end: float) -> FloatArray:
         return np.array([self.t_star]) if begin < self.t_star < end else np.empty(0)
 
-    def mode_after_stop(self, mode: Mode) -> Mode:
-        return 1
+    def mode_after_stop(self, mode: Mode, t: float) -> Mode:
+        return int(t >= self.t_star)
 
 
 @dataclasses.dataclass(frozen=True)
