@@ -1,4 +1,4 @@
-"""Plants with one hidden effect each, drawn by seed: what the diagnosis is examined on.
+"""Plants with a hidden effect each, or two, drawn by seed: what the diagnosis is examined on.
 
 Nothing here knows the library: laws, sensors and the integrator are written a second time on NumPy and SciPy alone, so
 that an error made in the library cannot be made in its examination as well.
@@ -7,4 +7,7 @@ that an error made in the library cannot be made in its examination as well.
 from .challenge import CAUSES as CAUSES
 from .challenge import FIRST_CAUSES as FIRST_CAUSES
 from .challenge import Challenge as Challenge
+from .challenge import Effect as Effect
 from .challenge import draw as draw
+from .two import PAIRS as PAIRS
+from .two import draw_two as draw_two

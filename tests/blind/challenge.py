@@ -38,6 +38,17 @@ NEEDS_REST = ("preload",)
 
 
 @dataclasses.dataclass(frozen=True)
+class Effect:
+    """One of two hidden effects; its fields mean what they mean in a challenge."""
+
+    cause: str
+    at: tuple[int | str, ...]
+    parameters: dict[str, Any]
+    share: float
+    left: float
+
+
+@dataclasses.dataclass(frozen=True)
 class Challenge:
     """A record with its hidden truth; everything in SI.
 
@@ -45,6 +56,9 @@ class Challenge:
     owner believes and `truth` the plant. `share` is the rms of the effect over that of k x + c v, and `left` what of it
     no other k and c take up; both are 0 where no law is hidden. `motion` is the exact motion, sensors apart. Among the
     parameters, `side` is an integer and `channel` the place of a sensor, as ("displacement", 1); all others are floats.
+
+    Where two effects are hidden, `cause` to `parameters`, `share` and `left` are those of the first, and `law` is the
+    sum of all laws among them.
     """
 
     seed: int
@@ -67,6 +81,12 @@ class Challenge:
     drive: Drive
     start: State
     motion: Motion
+    beside: Effect | None = None
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Ids of all causes, (1,) or (2,); "none" is one as well."""
+        return (self.cause,) if self.beside is None else (self.cause, self.beside.cause)
 
     @property
     def noise_floor(self) -> dict[str, float]:
@@ -97,11 +117,11 @@ def draw(
         If a name is unknown, or if no cause asked for can be told from the records asked for.
     """
     choice, physics, static = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
-    sets = _named("channels", channels, CHANNEL_SETS)
-    drives = _named("excitation", tuple(DRIVES) if excitation is None else excitation, DRIVES)
+    sets = named("channels", channels, CHANNEL_SETS)
+    drives = named("excitation", tuple(DRIVES) if excitation is None else excitation, DRIVES)
     settings = {
-        cause: [(s, e) for s in sets for e in drives if _can_tell(cause, s, e)]
-        for cause in _named("causes", causes, CAUSES)
+        cause: [(s, e) for s in sets for e in drives if can_tell(cause, s, e)]
+        for cause in named("causes", causes, CAUSES)
     }
     open_causes = [cause for cause, pairs in settings.items() if pairs]
     if not open_causes:
@@ -119,7 +139,7 @@ def draw(
     at: tuple[int | str, ...] = ()
     parameters: dict[str, Any] = {}
     model = plant
-    clean = _channels(drive, motion, kinds)
+    clean = true_channels(drive, motion, kinds)
     readings: Channels = {}
     if cause in WRONG_VALUES:
         field, name, at = WRONG_VALUES[cause]
@@ -130,10 +150,10 @@ def draw(
             kind, places = SENSORS[cause]
             sensor = kind.draw(physics, clean, [k for k in kinds if k in places], float(motion.time[1]))
             at, parameters = sensor.at, sensor.parameters
-            motion, earlier = _with_earlier(sensor, plant, drive, start, motion)
+            motion, earlier = with_earlier(sensor, plant, NoLaw(), drive, start, motion)
             if sensor.early:
                 start = (float(motion.x[0]), float(motion.v[0]))
-            truth = _channels(drive, motion, kinds)
+            truth = true_channels(drive, motion, kinds)
             clean = sensor.shown(truth, earlier)
             if sensor.after_noise:
                 readings = sensor.shown(with_noise(static, truth, level), earlier)
@@ -149,7 +169,7 @@ def draw(
     )  # fmt: skip
 
 
-def _channels(drive: Drive, motion: Motion, kinds: Sequence[str]) -> Channels:
+def true_channels(drive: Drive, motion: Motion, kinds: Sequence[str]) -> Channels:
     """What perfect sensors of these kinds would show, (n,) each."""
     everything = {
         "force": drive(motion.time),
@@ -160,7 +180,9 @@ def _channels(drive: Drive, motion: Motion, kinds: Sequence[str]) -> Channels:
     return {kind: everything[kind] for kind in kinds}
 
 
-def _with_earlier(sensor: Sensor, plant: Plant, drive: Drive, start: State, motion: Motion) -> tuple[Motion, Any]:
+def with_earlier(
+    sensor: Sensor, plant: Plant, law: Law, drive: Drive, start: State, motion: Motion
+) -> tuple[Motion, Any]:
     """The motion and a function that gives any channel some time before each sample.
 
     For a sensor that is late the plant is started before the record begins, so that there is a motion to be late with.
@@ -171,21 +193,22 @@ def _with_earlier(sensor: Sensor, plant: Plant, drive: Drive, start: State, moti
     step, tau = float(time[1]), sensor.parameters["tau"]
     begin = -np.ceil(max(DELAYS)) * step
     every = np.unique(np.concatenate([[begin], time - tau, time]))
-    longer = integrate(plant, NoLaw(), drive, start, every, rms(motion.x))
+    longer = integrate(plant, law, drive, start, every, rms(motion.x))
 
-    def at(instants: FloatArray) -> Motion:
-        i = np.searchsorted(every, instants)
-        return Motion(instants, longer.x[i], longer.v[i], longer.acceleration[i], longer.effect[i], np.empty(0))
+    def at(times: FloatArray) -> Motion:
+        i = np.searchsorted(every, times)
+        within = longer.instants[longer.instants >= times[0]]
+        return Motion(times, longer.x[i], longer.v[i], longer.acceleration[i], longer.effect[i], within)
 
     late = at(time - tau)
 
     def earlier(kind: str, tau: float) -> FloatArray:
-        return _channels(drive, late, (kind,))[kind]
+        return true_channels(drive, late, (kind,))[kind]
 
     return at(time), earlier
 
 
-def _named(argument: str, given: str | Sequence[str], known: Collection[str]) -> tuple[str, ...]:
+def named(argument: str, given: str | Sequence[str], known: Collection[str]) -> tuple[str, ...]:
     names = (given,) if isinstance(given, str) else tuple(given)
     unknown = [name for name in names if name not in known]
     if unknown or not names:
@@ -193,7 +216,7 @@ def _named(argument: str, given: str | Sequence[str], known: Collection[str]) ->
     return names
 
 
-def _can_tell(cause: str, channel_set: str, excitation: str) -> bool:
+def can_tell(cause: str, channel_set: str, excitation: str) -> bool:
     """Whether the record of a linear plant can show this cause and no other in its place.
 
     With acceleration alone the gains of force and accelerometer are one and the same. Without a force channel a plant
@@ -228,8 +251,8 @@ def _can_tell(cause: str, channel_set: str, excitation: str) -> bool:
 def _fair_question(rng: np.random.Generator, cause: str, excitation: str) -> tuple[Plant, Drive, State, Law, Motion]:
     """A plant under a drive with a law whose effect is of the wanted size, redrawn until it is."""
     for _ in range(50):
-        plant, time = _draw_plant(rng)
-        drive, start, plain = _draw_motion(rng, plant, excitation, time)
+        plant, time = draw_plant(rng)
+        drive, start, plain = draw_motion(rng, plant, excitation, time)
         scale, limit = rms(plain.x), FARTHEST * plain.peak
         if cause not in LAWS:
             return plant, drive, start, NoLaw(), integrate(plant, NoLaw(), drive, start, time, scale)
@@ -239,16 +262,7 @@ def _fair_question(rng: np.random.Generator, cause: str, excitation: str) -> tup
             try:
                 law = _sized(rng, LAWS[cause], Scene(plant, drive, plain), start, limit)
                 begin = law.start(*start, plant.stiffness)
-                aside = (begin[0] + SMALL_SHIFT * scale, begin[1])
-                if law.chaotic:
-                    here, there = (sketch(plant, law, drive, state, time, limit) for state in (begin, aside))
-                    if _parted(here, there, scale):
-                        continue
-                motion = integrate(plant, law, drive, begin, time, scale, limit=limit)
-                if law.chaotic and _parted(
-                    motion, integrate(plant, law, drive, aside, time, scale, 1e-8, limit), scale
-                ):
-                    continue
+                motion = trusted_motion(plant, law, drive, begin, time, scale, limit)
             except EscapeError:
                 continue
             if _is_fair(law, Scene(plant, drive, motion)):
@@ -262,12 +276,31 @@ def _is_fair(law: Law, scene: Scene) -> bool:
     return smallest <= share <= largest and left >= LEAST_LEFT and law.fits(scene)
 
 
-def _parted(one: Motion, other: Motion, scale: float) -> bool:
-    """Whether two motions from starts a small shift apart have gone so far apart that neither can be trusted."""
-    return float(np.abs(one.x - other.x).max()) > LARGEST_PARTING * SMALL_SHIFT * scale
+def trusted_motion(
+    plant: Plant, law: Law, drive: Drive, start: State, time: FloatArray, scale: float, limit: float
+) -> Motion:
+    """The exact motion, within `limit` [m]; `scale` [m] is a typical displacement.
+
+    Raises
+    ------
+    EscapeError
+        If it passes the limit, or parts from a near one so fast that it cannot be trusted.
+    """
+    if not law.chaotic:
+        return integrate(plant, law, drive, start, time, scale, limit=limit)
+    aside = (start[0] + SMALL_SHIFT * scale, start[1])
+    _stay_near(*(sketch(plant, law, drive, state, time, limit) for state in (start, aside)), scale)
+    motion = integrate(plant, law, drive, start, time, scale, limit=limit)
+    _stay_near(motion, integrate(plant, law, drive, aside, time, scale, 1e-8, limit), scale)
+    return motion
 
 
-def _draw_plant(rng: np.random.Generator) -> tuple[Plant, FloatArray]:
+def _stay_near(one: Motion, other: Motion, scale: float) -> None:
+    if float(np.abs(one.x - other.x).max()) > LARGEST_PARTING * SMALL_SHIFT * scale:
+        raise EscapeError("motions from starts a small shift apart go so far apart that neither can be trusted")
+
+
+def draw_plant(rng: np.random.Generator) -> tuple[Plant, FloatArray]:
     """Constants over decades, so that no number is at home in any unit; and the sample times, (SAMPLES,) [s]."""
     frequency_hz = np.exp(rng.uniform(np.log(0.3), np.log(100.0)))
     mass = float(np.exp(rng.uniform(np.log(0.1), np.log(1000.0))))
@@ -276,7 +309,7 @@ def _draw_plant(rng: np.random.Generator) -> tuple[Plant, FloatArray]:
     return plant, np.arange(SAMPLES) / (rng.uniform(30.0, 70.0) * frequency_hz)
 
 
-def _draw_motion(
+def draw_motion(
     rng: np.random.Generator, plant: Plant, excitation: str, time: FloatArray
 ) -> tuple[Drive, State, Motion]:
     """A drive and a start that move the plant without a law by 10 um to 100 mm rms, and a sketch of that motion."""

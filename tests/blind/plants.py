@@ -57,7 +57,10 @@ class Motion:
         link = rms(plant.stiffness * self.x + plant.damping * self.v)
         if link == 0.0:  # stuck where it stood
             return np.inf, np.inf
+        return rms(self.effect) / link, rms(self.left(plant, self.effect)) / link
+
+    def left(self, plant: Plant, force: FloatArray) -> FloatArray:
+        """What no other k and c could take up of a force (n,) along the motion, (n,) [N]."""
         # Both columns are forces, so that the least squares are well conditioned in any units.
         basis = np.stack([plant.stiffness * self.x, plant.mass * plant.omega * self.v], axis=1)
-        left = self.effect - basis @ np.linalg.lstsq(basis, self.effect, rcond=None)[0]
-        return rms(self.effect) / link, rms(left) / link
+        return force - basis @ np.linalg.lstsq(basis, force, rcond=None)[0]

@@ -358,7 +358,7 @@ def test_no_cause_is_drawn_that_the_record_could_not_tell():
         (cause, excitation)
         for cause in CAUSES
         for excitation in DRIVES
-        if any(challenge_module._can_tell(cause, channels, excitation) for channels in CHANNEL_SETS)
+        if any(challenge_module.can_tell(cause, channels, excitation) for channels in CHANNEL_SETS)
     ],
 )
 def test_every_cause_can_be_drawn_under_every_excitation(cause: str, excitation: str):

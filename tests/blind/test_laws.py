@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from . import CAUSES, FIRST_CAUSES, Challenge, draw
 from .arrays import FloatArray, rms
-from .challenge import CHANNEL_SETS, LEAST_LEFT, _can_tell
+from .challenge import CHANNEL_SETS, LEAST_LEFT, can_tell
 from .drives import DRIVES, Silence, SumOfSines
 from .exact import integrate
 from .laws import FIRST_LAWS, LAWS
@@ -294,7 +294,7 @@ def test_a_hundred_times_finer_tolerance_changes_neither_motion_nor_events(cause
 @pytest.mark.slow
 @pytest.mark.parametrize("cause", NEW_LAWS)
 def test_a_hundred_times_finer_tolerance_changes_no_whole_record(cause: str):
-    for excitation in [e for e in DRIVES if _can_tell(cause, "xva", e)]:
+    for excitation in [e for e in DRIVES if can_tell(cause, "xva", e)]:
         challenge = draw(2, causes=cause, excitation=excitation)
         fine = again(challenge, challenge.time, 1e-12)
         # A start may be parted from its neighbour a thousandfold: see LARGEST_PARTING.
@@ -537,7 +537,7 @@ def test_a_clipped_channel_shows_nothing_beyond_its_limit_noise_included():
     ],
 )
 def test_no_cause_is_asked_for_that_the_record_could_not_tell(cause: str, channels: str, excitation: str, tells: bool):
-    assert _can_tell(cause, channels, excitation) == tells
+    assert can_tell(cause, channels, excitation) == tells
 
 
 def test_a_preload_begins_with_a_plant_that_is_known_to_be_at_rest():
