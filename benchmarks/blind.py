@@ -2,11 +2,13 @@
 
     python benchmarks/blind.py --n 100 --seed 1 --jobs 2 --noise 0.001 0.01 --out results.jsonl
 
-One line of JSON per challenge is appended to the file as it is done; the same call goes on where it was stopped.
+One line of JSON per challenge is appended to the file as it is done; the same call goes on where it was stopped. With
+`--two`, two effects of different families are hidden at once.
 """
 
 import argparse
 import concurrent.futures
+import dataclasses
 import json
 import multiprocessing
 import os
@@ -18,8 +20,8 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from benchmarks.blind_table import Row, exact, said, table  # noqa: E402  (needs the line above when run as a script)
-from tests.blind import CAUSES, Challenge, draw  # noqa: E402
+from benchmarks.blind_table import Row, exact, hidden, said, table  # noqa: E402  (needs the line above when run as a script)
+from tests.blind import CAUSES, PAIRS, Challenge, draw, draw_two  # noqa: E402
 from tests.blind.challenge import CHANNEL_SETS, NOISE_LEVELS  # noqa: E402
 from tests.blind.drives import DRIVES  # noqa: E402
 
@@ -37,7 +39,7 @@ Drawing = dict[str, Any]
 
 def examine(seed: int, drawing: Drawing) -> Row:
     """The challenge of a seed put to the library, as one row; an exception becomes the row's "error"."""
-    challenge = draw(seed, **drawing)
+    challenge = drawn(seed, drawing)
     row = question(challenge) | {"drawing": drawing}
     begin = time.perf_counter()
     try:
@@ -48,8 +50,18 @@ def examine(seed: int, drawing: Drawing) -> Row:
     return row | said_of_it | {"seconds": time.perf_counter() - begin}
 
 
+def drawn(seed: int, drawing: Drawing) -> Challenge:
+    """The challenge of a seed; with "two" in the drawing, of two of its causes."""
+    arguments = dict(drawing)
+    if not arguments.pop("two", False):
+        return draw(seed, **arguments)
+    causes = set(arguments.pop("causes"))
+    return draw_two(seed, **arguments, pairs=[pair for pair in PAIRS if causes.issuperset(pair)])
+
+
 def question(challenge: Challenge) -> Row:
     """What was drawn, the truth included."""
+    beside = {"beside": dataclasses.asdict(challenge.beside)} if challenge.beside else {}
     return {
         "seed": challenge.seed,
         "cause": challenge.cause,
@@ -62,7 +74,7 @@ def question(challenge: Challenge) -> Row:
         "share": challenge.share,
         "left": challenge.left,
         "damping_ratio": challenge.truth.damping_ratio,
-    }
+    } | beside
 
 
 def answer(diagnosis: Any) -> Row:
@@ -137,11 +149,12 @@ def answers(seeds: Sequence[int], drawing: Drawing, jobs: int) -> Iterator[Row]:
 
 def progress_line(row: Row, done: int, total: int, elapsed: float) -> str:
     """One line for one row: which, the truth, what was said, and the time left."""
+    findings = row["findings"] if "beside" in row else row["findings"][:1]
     mark = "ok   " if exact(row) else "WRONG"
-    sure = f" p={row['findings'][0]['probability']:.2f}" if row["findings"] else ""
+    sure = " p=" + " ".join(f"{finding['probability']:.2f}" for finding in findings) if findings else ""
     left = elapsed / done * (total - done)
     return (
-        f"[{done:{len(str(total))}d}/{total}] {mark} seed {row['seed']}: {row['cause']} -> {said(row)}{sure}"
+        f"[{done:{len(str(total))}d}/{total}] {mark} seed {row['seed']}: {hidden(row)} -> {said(row)}{sure}"
         f"  {row['seconds']:.1f} s, {left / 60:.1f} min left"
     )
 
@@ -174,11 +187,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument(
         "--causes", nargs="+", default=list(CAUSES), choices=CAUSES, metavar="ID", help="any of the catalogue"
     )
+    parser.add_argument("--two", action="store_true", help="hide two of the causes at once")
     parser.add_argument("--channels", nargs="+", default=list(CHANNEL_SETS), choices=list(CHANNEL_SETS))
     parser.add_argument("--excitation", nargs="+", default=list(DRIVES), choices=list(DRIVES))
     parser.add_argument("--out", type=Path, help="file of JSON lines to append to and to resume from")
     given = parser.parse_args(arguments)
     drawing = {name: getattr(given, name) for name in ("causes", "noise", "channels", "excitation")}
+    if given.two:  # not said otherwise, so that files of one effect can be gone on with
+        drawing["two"] = True
     rows = run(range(given.seed, given.seed + given.n), drawing, given.jobs, given.out, lambda s: print(s, flush=True))
     if rows:
         print("\n" + table(sorted(rows, key=lambda row: row["seed"])))

@@ -289,7 +289,8 @@ def trusted_motion(
     if not law.chaotic:
         return integrate(plant, law, drive, start, time, scale, limit=limit)
     aside = (start[0] + SMALL_SHIFT * scale, start[1])
-    _stay_near(*(sketch(plant, law, drive, state, time, limit) for state in (start, aside)), scale)
+    here, there = (sketch(plant, law, drive, state, time, limit) for state in (start, aside))
+    _stay_near(here, there, scale)
     motion = integrate(plant, law, drive, start, time, scale, limit=limit)
     _stay_near(motion, integrate(plant, law, drive, aside, time, scale, 1e-8, limit), scale)
     return motion

@@ -241,7 +241,7 @@ class _Run:
         return min(crossings, default=None)
 
     def held(self, mode: Mode, here: float, until: float, state: FloatArray, time: FloatArray) -> _Phase:
-        x, z = float(state[0]), state[2:]
+        x, z = float(state[0]), tuple(state[2:].tolist())
 
         def still(t):
             """States (states, n) while the mass is held."""

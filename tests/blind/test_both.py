@@ -18,7 +18,7 @@ from .sketch import sketch
 
 PLANT = Plant(mass=1.0, stiffness=1.0, damping=0.05)
 DRIVE = SumOfSines(np.array([0.6, 0.7, 0.4]), np.array([0.37, 0.9, 1.7]), np.array([0.3, 1.0, 2.0]))
-TIME = np.arange(1000) * 0.06
+TIME = np.arange(1000, dtype=float) * 0.06
 START = (0.4, 0.0)
 
 CUBIC = stiffness.CubicHardening(k3=0.2)

@@ -7,7 +7,21 @@ from types import SimpleNamespace
 import pytest
 
 from benchmarks import blind
-from benchmarks.blind_table import Row, Share, confusions, covers, exact, in_class, kind, said, silent, table
+from benchmarks.blind_table import (
+    Row,
+    Share,
+    confusions,
+    covers,
+    exact,
+    half,
+    hidden,
+    in_class,
+    kind,
+    said,
+    silent,
+    table,
+    wrong,
+)
 
 
 def finding(
@@ -37,6 +51,26 @@ WRONG_VALUE = row("stiffness_value", "parameters", finding("mass_value"))
 FALSE_ALARM = row("none", "cause", finding("coulomb", 0.7))
 QUIET = row("none", "consistent")
 FAILED = row("coulomb", "failed", error="ValueError: no", closed=None)
+
+
+def pair(verdict: str, *findings: Row, **changes) -> Row:
+    """A row of two hidden effects: friction, and a cubic spring beside it."""
+    beside = {"cause": "cubic_hardening", "at": [0, 1], "parameters": {"k3": 7.0}, "share": 0.2, "left": 0.1}
+    return row("coulomb", verdict, *findings, parameters={"F": 2.0}, beside=beside, **changes)
+
+
+TWO = pair("cause", finding("cubic_hardening", k3=(6.0, 6.5)), finding("coulomb", F=(1.9, 2.1)))
+TWO_BY_RIVAL = pair("cause", finding("coulomb"), finding("quintic_stiffness", 0.6, rivals=("cubic_hardening",)))
+HALF = pair("cause", finding("coulomb"))
+HALF_WRONG = pair("cause", finding("coulomb"), finding("jenkins", 0.97), seed=8)
+ALL_WRONG = pair("cause", finding("jenkins", 0.8))
+BLAMED = pair("parameters", finding("damping_value", 0.95), seed=9)
+LEFT_UNNAMED, UNDECIDED, CALLED_FINE = pair("unnamed"), pair("undecided"), pair("consistent")
+TWO_FAILED = pair("failed", error="ValueError: no", closed=None)
+PAIRS = [
+    *(TWO, TWO_BY_RIVAL, HALF, HALF_WRONG, ALL_WRONG, BLAMED),
+    *(LEFT_UNNAMED, UNDECIDED, CALLED_FINE, TWO_FAILED),
+]
 
 
 def test_wilsons_interval_is_the_published_one():
@@ -132,6 +166,61 @@ def test_a_table_of_nothing_but_failures_still_prints():
     assert "seconds, median none" in " ".join(table([FAILED]).split())
 
 
+# two hidden effects
+
+
+def test_of_two_effects_both_must_be_named_in_any_order_and_nothing_else():
+    assert [r for r in PAIRS if exact(r)] == [TWO]
+    assert not exact(pair("cause", finding("coulomb"), finding("cubic_hardening"), finding("jenkins")))
+    assert not exact(pair("cause", finding("coulomb"), finding("coulomb")))
+
+
+def test_of_two_effects_each_must_be_a_finding_or_a_rival_of_another_finding():
+    assert [r for r in PAIRS if in_class(r)] == [TWO, TWO_BY_RIVAL]
+    one_for_both = finding("coulomb", rivals=("cubic_hardening",))
+    assert not in_class(pair("cause", one_for_both)) and not in_class(pair("cause", one_for_both, finding("jenkins")))
+    assert in_class(pair("cause", one_for_both, finding("jenkins", rivals=("coulomb",))))
+
+
+def test_of_two_effects_one_may_be_named_with_nothing_wrong_or_beside_a_wrong_name():
+    assert [r for r in PAIRS if half(r)] == [HALF]
+    assert [r for r in PAIRS if wrong(r)] == [TWO_BY_RIVAL, HALF_WRONG, ALL_WRONG, BLAMED]
+    assert [f["cause"] for f in wrong(HALF_WRONG)] == ["jenkins"]
+
+
+def test_coverage_of_two_effects_is_that_of_each_named_one():
+    assert covers(TWO) == {"cubic_hardening.k3": False, "coulomb.F": True}
+    assert covers(ALL_WRONG) == {}
+
+
+def test_the_table_of_two_effects_counts_each_row_where_it_belongs():
+    assert hidden(TWO) == "coulomb + cubic_hardening" and said(TWO) == "cubic_hardening + coulomb"
+    text = table(PAIRS)
+    lines = [" ".join(line.split("(")[0].split()) for line in text.splitlines()]
+    for expected in (
+        "pairs 10",
+        "both named exactly 1 of 10 = 10%",
+        "both named or rivals 2 of 10 = 20%",
+        "one named, nothing wrong 1 of 10 = 10%",
+        "any wrong name 4 of 10 = 40%",
+        "undecided 1 of 10 = 10%",
+        "left unnamed 1 of 10 = 10%",
+        "called consistent 1 of 10 = 10%",
+        "own values blamed alone 1 of 10 = 10%",
+        "intervals that cover 1 of 2 = 50%",
+        "names right where p > 0.9 5 of 7 = 71%",
+        "1 x coulomb + cubic_hardening -> coulomb + jenkins",
+        "coulomb 4 of 10 = 40%",
+        "cubic_hardening 1 of 10 = 10%",
+        "seed 1: coulomb + cubic_hardening: ValueError: no",
+    ):
+        assert expected in lines
+    sure = text[text.index("wrong with p > 0.9") : text.index("no answer")]
+    assert "seed 8: coulomb + cubic_hardening -> coulomb + jenkins, p = 0.970, sweep, x, noise 0.01" in sure
+    assert "seed 9" in sure and sure.count("seed") == 2
+    assert table([TWO_FAILED, TWO]).startswith("pairs")
+
+
 def diagnosis(gain: SimpleNamespace | None) -> SimpleNamespace:
     estimate = SimpleNamespace(value=2.0, low=1.9, high=2.1, unit="N")
     rival = SimpleNamespace(cause="quadratic_damping", at=(0, 1), probability=0.04)
@@ -163,6 +252,24 @@ def test_a_diagnosis_that_fails_becomes_a_row_with_its_error(monkeypatch: pytest
     )
     assert json.loads(json.dumps(result)) == result
     assert not exact(result)
+
+
+def test_two_of_the_causes_are_hidden_where_the_drawing_says_so(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(blind, "_diagnose", lambda challenge: diagnosis(None))
+    drawing = {"causes": ["preload", "accel_bias", "none"], "excitation": ["harmonic"], "two": True}
+    result = blind.examine(0, drawing)
+    assert (result["cause"], result["beside"]["cause"]) == ("preload", "accel_bias")
+    assert result["drawing"] == drawing and json.loads(json.dumps(result))["beside"]["parameters"]
+    assert half(result) is False and exact(result) is False
+    assert "beside" not in blind.examine(0, {"causes": ["force_gain"], "excitation": ["harmonic"]})
+
+
+def test_only_a_call_for_two_effects_draws_them(monkeypatch: pytest.MonkeyPatch):
+    drawings = []
+    monkeypatch.setattr(blind, "run", lambda seeds, drawing, *others: drawings.append(drawing) or [])
+    blind.main(["--causes", "coulomb", "maxwell"])
+    blind.main(["--causes", "coulomb", "maxwell", "--two"])
+    assert "two" not in drawings[0] and drawings[1] == drawings[0] | {"two": True}
 
 
 def test_a_repeated_call_examines_only_the_seeds_that_are_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -207,3 +314,5 @@ def test_a_line_of_progress_tells_the_time_left():
     line = blind.progress_line(NAMED, done=2, total=10, elapsed=60.0)
     assert line == "[ 2/10] ok    seed 1: coulomb -> coulomb p=0.99  2.0 s, 4.0 min left"
     assert "WRONG seed 7: coulomb -> quadratic_damping p=0.97" in blind.progress_line(SURE_AND_WRONG, 1, 1, 1.0)
+    two = "ok    seed 1: coulomb + cubic_hardening -> cubic_hardening + coulomb p=0.99 0.99"
+    assert two in blind.progress_line(TWO, 1, 1, 1.0)

@@ -1,5 +1,6 @@
 """Challenges with two hidden effects: which pairs there are, and that what is drawn is what was promised."""
 
+import dataclasses
 import functools
 
 import numpy as np
@@ -9,8 +10,9 @@ from . import PAIRS, Challenge, draw_two
 from . import two as two_module
 from .arrays import FloatArray, rms
 from .challenge import LEAST_LEFT, can_tell
+from .drives import Silence
 from .exact import integrate
-from .laws import LAWS, Both
+from .laws import LAWS, Both, NoLaw, Scene
 from .plants import EscapeError, Motion, Plant
 from .sensors import SENSORS
 from .two import LARGEST_OVERLAP, SHARES, Pair, family, overlap
@@ -164,6 +166,22 @@ def test_two_forces_overlap_by_what_one_explains_of_the_other_beyond_k_and_c():
     assert overlap(plant, motion, third + 7.0 * x, 2.0 * third - 3.0 * v) == pytest.approx(1.0)
     assert overlap(plant, motion, third + 7.0 * x, fifth + 7.0 * x) == pytest.approx(0.0, abs=1e-12)
     assert overlap(plant, motion, third, third + fifth) == pytest.approx(0.5)
+
+
+def test_a_force_that_is_much_like_the_other_is_not_fair():
+    time = np.linspace(0.0, 40.0 * np.pi, 4000, endpoint=False)
+    x, third, fifth = np.cos(time), 0.2 * np.cos(3.0 * time), 0.2 * np.sin(5.0 * time)
+    motion = Motion(time, x, -np.sin(time), -x, 0.0 * x, np.empty(0))
+    scene = Scene(Plant(1.0, 1.0, 0.1), Silence(), motion)
+
+    def judged(*each: FloatArray) -> None:
+        two_module._must_be_fair(NoLaw(), [dataclasses.replace(motion, effect=force) for force in each], scene)
+
+    judged(third, 0.75 * third + 0.6 * fifth)  # 0.61
+    with pytest.raises(EscapeError, match="much like the other"):
+        judged(third, 0.9 * third + 0.5 * fifth)  # 0.76
+    with pytest.raises(EscapeError, match="not of the size of one of two"):
+        judged(0.2 * third, fifth)
 
 
 @pytest.mark.slow

@@ -48,27 +48,27 @@ class Both(Law):
     # what the two have in common
 
     @property
-    def smooth(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def smooth(self) -> bool:
         return self.first.smooth and self.second.smooth
 
     @property
-    def hidden(self) -> tuple[Literal["displacement", "velocity"], ...]:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def hidden(self) -> tuple[Literal["displacement", "velocity"], ...]:
         return self.first.hidden + self.second.hidden
 
     @property
-    def slack(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def slack(self) -> float:
         return max(self.first.slack, self.second.slack)
 
     @property
-    def chaotic(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def chaotic(self) -> bool:
         return self.first.chaotic or self.second.chaotic
 
     @property
-    def creeps(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def creeps(self) -> bool:
         return self.first.creeps or self.second.creeps
 
     @property
-    def dry(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def dry(self) -> bool:
         return self.first.dry
 
     @property
