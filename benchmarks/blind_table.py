@@ -214,7 +214,7 @@ def _table_of_two(rows: Sequence[Row]) -> str:
     causes = sorted({truth["cause"] for row in rows for truth in truths(row)})
     of_cause = {cause: [row for row in rows if cause in {truth["cause"] for truth in truths(row)}] for cause in causes}
     lists = {
-        "not both, nor both alone": [f"{count} x {truth} -> {answer}" for truth, answer, count in confusions(answered)],
+        "said instead": [f"{count} x {truth} -> {answer}" for truth, answer, count in confusions(answered)],
         f"wrong with p > {CONFIDENT}": [_line(row, finding) for row, finding in surely_wrong],
         "no answer": [f"seed {row['seed']}: {hidden(row)}: {row['error']}" for row in failed],
         "named, by cause": [
