@@ -236,6 +236,7 @@ def diagnose(
     cause: Annotated[
         list[str] | None, typer.Option(help="Look for this cause (`jfsm causes` lists them); repeat for more.")
     ] = None,
+    max_causes: Annotated[int, typer.Option(help="Effects that may act at once: 1, or 2.", min=1, max=2)] = 2,
     key: Seed = None,
 ) -> None:
     """Say what a model gets wrong about a record, why, and what mending it is worth."""
@@ -245,7 +246,9 @@ def diagnose(
     _check_outputs({"--report": report, "--json": json, "--extended": extended}, inputs)
     record, held, believed = source.read(), _holdout(holdout, source), _load(model)
     with _progress() as tell:
-        d = diagnose(record, believed, holdout=held, causes=cause, key=_key(key), progress=tell)
+        d = diagnose(
+            record, believed, holdout=held, causes=cause, max_causes=max_causes, key=_key(key), progress=tell
+        )
     if report is not None:
         d.report(report)
     if json is not None:
