@@ -246,9 +246,7 @@ def diagnose(
     _check_outputs({"--report": report, "--json": json, "--extended": extended}, inputs)
     record, held, believed = source.read(), _holdout(holdout, source), _load(model)
     with _progress() as tell:
-        d = diagnose(
-            record, believed, holdout=held, causes=cause, max_causes=max_causes, key=_key(key), progress=tell
-        )
+        d = diagnose(record, believed, holdout=held, causes=cause, max_causes=max_causes, key=_key(key), progress=tell)
     if report is not None:
         d.report(report)
     if json is not None:

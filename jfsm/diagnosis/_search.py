@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,18 +16,27 @@ from ._effect import Effect
 from ._pairs import instead, pairs
 from ._trial import Trial, trial
 
-_LADDER = (0.3, 0.03, 0.01)
-"""Rungs for a candidate: the refit has been at the top already."""
 _FAR_BEHIND = 200.0
 """Nats behind the leader, one per cent of unmodelled force forgiven, from which a candidate is not pursued,"""
 _ALWAYS_PURSUED = 4
 """unless it is among the best of them."""
-_STILL_OPEN = 10
-"""Lots that go on after an early rung, at least; half of them in any case,"""
 _PROMISING = 4
-"""and the laws that explain most of the missing force, and causes of which it tells nothing: what they are worth, a few
-steps may not show."""
+"""Laws that explain most of the missing force: no early rung ends them, nor causes of which it tells nothing. What they
+are worth, a few steps may not show."""
 
+
+class _Way(NamedTuple):
+    """Rungs of a climb, and how many lots go on after an early one: so many at least, and such a share of them."""
+
+    ladder: tuple[float, ...]
+    least: int
+    share: float
+
+
+_ALONE = _Way((0.3, 0.03, 0.01), 10, 0.5)
+"""Of single effects: the refit has been at the top already."""
+_TOGETHER = _Way((0.03, 0.01), 6, 0.25)
+"""Of pairs: one of the two has been fitted already."""
 
 Beginning = tuple[Candidate, Structure, Mapping[str, float] | None]
 """A candidate, the structure with the size of its effect, and the own values to begin with (None: as given)."""
@@ -35,7 +45,9 @@ Beginning = tuple[Candidate, Structure, Mapping[str, float] | None]
 class _Lot:
     """Starts of one law on their way up, side by side."""
 
-    def __init__(self, beginnings: Sequence[Beginning], model: Structure, records: Sequence[Nuisances], until):
+    def __init__(
+        self, beginnings: Sequence[Beginning], model: Structure, records: Sequence[Nuisances], until, ladder: Sequence
+    ):
         candidates, starts, begins = zip(*beginnings, strict=True)
         records = [n.resolving(starts) for n in records]
         lanes = lanes_of(starts[0])
@@ -46,15 +58,15 @@ class _Lot:
         self.label = " beside ".join(effect.label for effect in candidates[0].effects)
         self.share = max(math.inf if candidate.share is None else candidate.share for candidate in candidates)
         self.program, self.behind = posteriors[0].program, 0.0
-        self.climb = self._climb(posteriors, candidates, lanes)
+        self.climb = self._climb(posteriors, candidates, lanes, ladder)
 
-    def _climb(self, posteriors: Sequence[Posterior], candidates: tuple[Candidate, ...], lanes: int):
+    def _climb(self, posteriors: Sequence[Posterior], candidates: tuple[Candidate, ...], lanes: int, ladder):
         # Where one climbs alone it is the one that begins best, seen from where not too much is forgiven.
         best = 0
         if len(posteriors) > 1:
-            best = int(np.argmin([np.min(p.evaluate(p.initial(), _LADDER[1])[0]) for p in posteriors]))
+            best = int(np.argmin([np.min(p.evaluate(p.initial(), ladder[-2])[0]) for p in posteriors]))
         self.posterior, self.candidates = posteriors[best], candidates[best * lanes :][:lanes]
-        yield from rungs(self.posterior, _LADDER)
+        yield from rungs(self.posterior, ladder)
 
     def step(self) -> "_Lot":
         """On to the next rung."""
@@ -121,9 +133,10 @@ def search(
     """The best trial of every candidate; those far behind stay at the values of their rung."""
     values = refitted.structure.values()
     own = {p: values[p] for p in model.entries()} if refitted.evidence > given.evidence else None
-    lots = [_Lot(beginnings, model, records, until) for beginnings in groups(tried, own)]
+    lots = [_Lot(beginnings, model, records, until, _ALONE.ladder) for beginnings in groups(tried, own)]
     most = sorted((candidate.share or 0.0 for candidate in tried), reverse=True)[:_PROMISING]
-    return _climbed(lots, [lot for lot in lots if lot.share > 0 and lot.share >= most[-1]], refitted, refitted, tell)
+    kept = [lot for lot in lots if lot.share > 0 and lot.share >= most[-1]]
+    return _climbed(lots, _ALONE, kept, refitted, refitted, tell)
 
 
 def search_pairs(
@@ -139,8 +152,8 @@ def search_pairs(
     best = min(singles, key=lambda t: t.value)
 
     def climbed(tried: Sequence[Candidate]) -> list[Trial]:
-        lots = [_Lot(beginnings, model, records, until) for beginnings in groups(tried, None)]
-        return _climbed(lots, [], refitted, best, tell) if lots else []
+        lots = [_Lot(beginnings, model, records, until, _TOGETHER.ladder) for beginnings in groups(tried, None)]
+        return _climbed(lots, _TOGETHER, [], refitted, best, tell) if lots else []
 
     found = climbed(pairs(singles, effects, model, records[0]))
     leader = max(found, key=lambda t: t.evidence, default=best)
@@ -152,15 +165,20 @@ def search_pairs(
 
 
 def _climbed(
-    lots: Sequence[_Lot], kept: Sequence[_Lot], refitted: Trial, best: Trial, tell: Callable[[str, int], None]
+    lots: Sequence[_Lot],
+    way: _Way,
+    kept: Sequence[_Lot],
+    refitted: Trial,
+    best: Trial,
+    tell: Callable[[str, int], None],
 ) -> list[Trial]:
     """All lots on their way up, the hopeless ones that are not `kept` only so far; `best` is known already."""
     for together in compiled_once(lots):
         for lot in side_by_side(_Lot.step, together):
             tell(lot.label, 2 * len(lots))
     pursued = lots
-    for _ in _LADDER[1:]:
-        near = _near(pursued, max(_STILL_OPEN, len(pursued) // 2))
+    for _ in way.ladder[1:]:
+        near = _near(pursued, max(way.least, int(way.share * len(pursued))))
         pursued = [lot for lot in pursued if lot in near or lot in kept]
         list(side_by_side(_Lot.step, pursued))
     pursued = _near(pursued, _ALWAYS_PURSUED, best.rung)
