@@ -211,9 +211,11 @@ def test_a_spring_is_told_beside_a_gain_error_of_the_force(believed):
     assert gain.parameters["eps"].value == pytest.approx(0.15, abs=0.03)
 
 
-def test_no_second_effect_is_looked_for_where_one_is_asked_for(believed):
+def test_no_second_effect_is_looked_for_where_one_is_asked_for_and_what_is_left_is_said(believed, two_hidden):
     d = jfsm.diagnose(made(two_laws), believed, causes=FEW, max_causes=1, key=jax.random.key(0))
     assert len(d.findings) < 2
+    assert d.verdict != "cause" or "Something is left" in d.sentence
+    assert "left" not in two_hidden.sentence
     assert not any("+" in c.cause for c in d.candidates)
 
 

@@ -178,10 +178,14 @@ def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
 
 
 def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
-    """Why a pair is no alternative to one of its effects alone, or nothing."""
+    """Why a pair is no alternative to one of its effects alone, or to the best single one, or nothing."""
+    if len(t.effects) == 1:
+        return ""
+    singles = [alone for alone in tried if len(alone.effects) == 1]
+    best = max(singles, key=lambda alone: alone.evidence, default=refitted)
     size = np.sqrt(refitted.prediction.error)
-    for alone in tried:
-        if len(t.effects) == 1 or len(alone.effects) != 1 or alone.effects[0] not in t.effects:
+    for alone in singles:
+        if alone is not best and alone.effects[0] not in t.effects:
             continue
         if adequate(t) and adequate(alone) and len(t.laws) < 2:  # own values tell a gain by what is believed of them
             if t.evidence - alone.evidence <= SIGNIFICANT:

@@ -103,10 +103,12 @@ def diagnose(
         records = prepare_all(whole, model, reconstruction, weighed=refitted.structure)
         given = fit_model("given", model, records, until, refit=False)
         refitted = fit_model("refitted", model, records, until, refit=True)
-    trials = search(tried, model, given, refitted, records, until, steps.next)
+    trials, behind = search(tried, model, given, refitted, records, until, steps.next)
     if max_causes > 1:
         effects = _beside([given, refitted, *trials], [effect for candidate in every for effect in candidate.effects])
-        trials += search_pairs(effects, trials, model, refitted, records, until, steps.next) if effects else []
+        if effects:
+            found = search_pairs(effects, trials, model, refitted, records, until, steps.next)
+            trials, behind = trials + found.trials, behind + found.behind
     steps.next("the missing force")
     periods = sum(n.record.duration for n in records) * records[0].omega / (2 * math.pi)
     imposed = records[0].path is not None
@@ -130,8 +132,10 @@ def diagnose(
     unseen = []
     if decision.verdict in ("consistent", "undecided"):  # silence is worth what would have been heard
         steps.next("what would have been seen")
-        unseen = also_detectable(left_out, model, records, until)
-    tested = Tested(trials, left_out, unseen)
+        dropped = {b.effects for b in behind}
+        laws = [c for c in tried if c.effects in dropped and not c.effects[0].cause.is_sensor]
+        unseen = also_detectable(left_out + laws, model, records, until)
+    tested = Tested(trials, behind, left_out, unseen)
     return assemble(decision, clipped, refitted, tested, model, extended, records, missing, gain, runs)
 
 

@@ -10,12 +10,13 @@ from ..identification import Nuisances
 from ..structures import PARAMETER_CAUSES, Cause, Clipping, Structure, causes
 from ._candidates import Candidate
 from ._clipped import finding
-from ._decide import Decision
+from ._decide import NEGLIGIBLE, Decision
 from ._detectable import Unseen, detectable
 from ._diagnosis import CandidateResult, Diagnosis, Estimate, Finding, Rival
 from ._effect import Effect, names, places
 from ._gain import Gain
 from ._residual import Residual, curves
+from ._search import LeftBehind
 from ._trial import Trial
 
 _RIVAL = 0.02
@@ -25,9 +26,11 @@ _SHOWN = 2000
 
 
 class Tested(NamedTuple):
-    """Candidates that were fitted, those that were not, and what of the latter would have been seen."""
+    """Candidates that were fitted, those that were only so far, those that were not, and what of the latter would have
+    been seen."""
 
     trials: list[Trial]
+    behind: list[LeftBehind]
     left_out: list[Candidate]
     unseen: Unseen
 
@@ -52,6 +55,7 @@ def assemble(
         findings += tuple(finding(sensor, units[sensor.at[0]]) for sensor in clipped)
     candidates = (
         *(_candidate(t, decision, refitted, model, units) for t in sorted(trials, key=lambda t: -t.evidence)),
+        *(_left_behind(b) for b in sorted(tested.behind, key=lambda b: b.nats)),
         *(_passed_over(c) for c in sorted(tested.left_out, key=lambda c: -(c.share or 0.0))),
     )
     winner = decision.winner if decision.winner.label != "given" else refitted
@@ -198,6 +202,11 @@ def _candidate(t: Trial, decision: Decision, refitted: Trial, model: Structure, 
     )  # fmt: skip
 
 
+def _left_behind(b: LeftBehind) -> CandidateResult:
+    why = f"not pursued: {b.nats:.3g} nats behind the best where a misfit is still forgiven"
+    return CandidateResult(names(b.effects), places(b.effects), -math.inf, {}, 0.0, 0.0, {}, why)
+
+
 def _passed_over(c: Candidate) -> CandidateResult:
     share = c.share or 0.0
     why = f"not fitted: explains {share:.0%} of the missing force, and other laws more"
@@ -219,7 +228,7 @@ def _words(decision: Decision, findings: tuple[Finding, ...], gain: Gain | None,
     if decision.verdict == "cause":
         known = dict(causes()) | {e.cause.id: e.cause for e in decision.winner.effects}
         said = " ".join(_said(f, known[f.cause]) for f in findings)
-        return f"{said}{share}", "Use the extended model."
+        return f"{said}{_remainder(decision.winner)}{share}", "Use the extended model."
     if decision.verdict == "unnamed":
         return (
             f"A real effect is there that no catalogue entry explains; a map stands in.{share}",
@@ -230,6 +239,14 @@ def _words(decision: Decision, findings: tuple[Finding, ...], gain: Gain | None,
         "Something is wrong beyond noise, and this record cannot tell what.",
         f"Record a second run with another amplitude, or {more}.",
     )
+
+
+def _remainder(winner: Trial) -> str:
+    """That what was named does not explain everything, where so."""
+    left = winner.prediction.left
+    if left < NEGLIGIBLE:
+        return ""
+    return f" Something is left beyond {'them' if len(winner.effects) > 1 else 'it'}: {left:.1%} of the signal."
 
 
 def _said(finding: Finding, cause: Cause) -> str:

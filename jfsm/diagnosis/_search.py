@@ -38,6 +38,21 @@ _ALONE = _Way((0.3, 0.03, 0.01), 10, 0.5)
 _TOGETHER = _Way((0.03, 0.01), 6, 0.25)
 """Of pairs: one of the two has been fitted already."""
 
+
+class LeftBehind(NamedTuple):
+    """A candidate that was not pursued, and how many nats it was behind the best after the same rung."""
+
+    effects: tuple[Effect, ...]
+    nats: float
+
+
+class Found(NamedTuple):
+    """The best trial of every candidate that was pursued, and the others."""
+
+    trials: list[Trial]
+    behind: list[LeftBehind]
+
+
 Beginning = tuple[Candidate, Structure, Mapping[str, float] | None]
 """A candidate, the structure with the size of its effect, and the own values to begin with (None: as given)."""
 
@@ -129,14 +144,14 @@ def search(
     records: Sequence[Nuisances],
     until: Sequence[int],
     tell: Callable[[str, int], None],
-) -> list[Trial]:
-    """The best trial of every candidate; those far behind stay at the values of their rung."""
+) -> Found:
+    """Every candidate fitted, those far behind only so far."""
     values = refitted.structure.values()
     own = {p: values[p] for p in model.entries()} if refitted.evidence > given.evidence else None
     lots = [_Lot(beginnings, model, records, until, _ALONE.ladder) for beginnings in groups(tried, own)]
     most = sorted((candidate.share or 0.0 for candidate in tried), reverse=True)[:_PROMISING]
     kept = [lot for lot in lots if lot.share > 0 and lot.share >= most[-1]]
-    return _climbed(lots, _ALONE, kept, refitted, refitted, tell)
+    return _climbed(lots, _ALONE, kept, refitted, tell)
 
 
 def search_pairs(
@@ -147,31 +162,27 @@ def search_pairs(
     records: Sequence[Nuisances],
     until: Sequence[int],
     tell: Callable[[str, int], None],
-) -> list[Trial]:
-    """The best trial of every pair tried: of good single causes, then those that share one with the best pair."""
-    best = min(singles, key=lambda t: t.value)
+) -> Found:
+    """Pairs of good single causes fitted, then those that share one with the best pair."""
+    best = min([refitted, *singles], key=lambda t: t.value)
 
-    def climbed(tried: Sequence[Candidate]) -> list[Trial]:
+    def climbed(tried: Sequence[Candidate]) -> Found:
         lots = [_Lot(beginnings, model, records, until, _TOGETHER.ladder) for beginnings in groups(tried, None)]
-        return _climbed(lots, _TOGETHER, [], refitted, best, tell) if lots else []
+        return _climbed(lots, _TOGETHER, [], best, tell)
 
-    found = climbed(pairs(singles, effects, model, records[0]))
-    leader = max(found, key=lambda t: t.evidence, default=best)
+    first = climbed(pairs(singles, effects, model, records[0]))
+    leader = max(first.trials, key=lambda t: t.evidence, default=best)
     if explained(leader, best) < GATE:
-        return found
-    done = {frozenset(t.effects) for t in found}
+        return first
+    done = {one.effects for one in (*first.trials, *first.behind)}
     near = instead(leader, effects, model, records[0])
-    return _best_of_each([*found, *climbed([c for c in near if frozenset(c.effects) not in done])])
+    then = climbed([c for c in near if c.effects not in done])
+    return Found(first.trials + then.trials, first.behind + then.behind)
 
 
 def _climbed(
-    lots: Sequence[_Lot],
-    way: _Way,
-    kept: Sequence[_Lot],
-    refitted: Trial,
-    best: Trial,
-    tell: Callable[[str, int], None],
-) -> list[Trial]:
+    lots: Sequence[_Lot], way: _Way, kept: Sequence[_Lot], best: Trial, tell: Callable[[str, int], None]
+) -> Found:
     """All lots on their way up, the hopeless ones that are not `kept` only so far; `best` is known already."""
     for together in compiled_once(lots):
         for lot in side_by_side(_Lot.step, together):
@@ -184,20 +195,23 @@ def _climbed(
     pursued = _near(pursued, _ALWAYS_PURSUED, best.rung)
 
     def finished(lot: _Lot) -> list[Trial]:
-        if lot in pursued:
-            return list(lot.trials(finish(lot.posterior, lot.rung, best=leader)))
-        found = lot.trials(lot.rung)
-        return [replace(t, evidence=refitted.evidence - lot.behind, converged=False) for t in found]
+        return list(lot.trials(finish(lot.posterior, lot.rung, best=leader)))
 
     # The leader goes first: beside its top the others may be left where they are.
     trials, leader = [], best.value
-    ranked = sorted(lots, key=lambda lot: lot.behind)
+    ranked = sorted(pursued, key=lambda lot: lot.behind)
     for together in (ranked[:1], ranked[1:]):
         for found in side_by_side(finished, together):
             tell("the best candidates", 2 * len(lots))
             trials += found
         leader = min([leader, *(t.value for t in trials)])
-    return _best_of_each(trials)
+    trials = _best_of_each(trials)
+    done, behind = {t.effects for t in trials}, dict[tuple[Effect, ...], float]()
+    for lot in lots:
+        for candidate in lot.candidates:
+            if candidate.effects not in done:
+                behind[candidate.effects] = min(lot.behind, behind.get(candidate.effects, math.inf))
+    return Found(trials, [LeftBehind(effects, nats) for effects, nats in behind.items()])
 
 
 def _near(lots: Sequence[_Lot], least: int, leader: float = math.inf) -> list[_Lot]:
