@@ -1,9 +1,11 @@
 """The filter of a plant: for a linear one it must say what a dense multivariate normal law says."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from references import sticking_motion
 from scipy.linalg import expm
 from scipy.stats import multivariate_normal
 
@@ -160,3 +162,89 @@ def test_while_a_link_sticks_nothing_is_uncertain_about_its_speed():
     # The place at rest is known ever better, as a mean of readings is.
     expected = 1e-4 + 1 / (1 / 0.01 + np.arange(n) / 1e-4)
     np.testing.assert_allclose(found.variance[:, 0], expected, rtol=1e-9)
+
+
+RUBBING = {"mass": 1.0, "stiffness": 9.0, "damping": 0.05, "F": 0.6}
+RUBBED = jfsm.Structure.sdof(RUBBING["mass"], RUBBING["stiffness"], RUBBING["damping"]) + jfsm.Coulomb(0.6, at=(0, 1))
+STEP, SUBSTEPS = 0.05, 2
+ACCELERATION = (("acceleration", 1),)
+
+
+def rubbing(n: int, force=lambda t: np.zeros(1), x0: float = 0.0) -> np.ndarray:
+    """Acceleration (n,) of a mass on a spring that rubs, with true stick, by SciPy."""
+    time, (m, k, c, limit) = STEP * np.arange(n), RUBBING.values()
+    x, v, _ = sticking_motion(m, c, k, [[1.0]], [limit], force, time, x0, 0.0)
+    x, v, g = x[:, 0], v[:, 0], np.array([force(t)[0] for t in time])
+    moves = np.abs(v) > 1e-9 * np.max(np.abs(v))
+    pull = g - k * x - c * v
+    return np.where(moves, pull - limit * np.sign(v), np.sign(pull) * np.maximum(np.abs(pull) - limit, 0.0)) / m
+
+
+def rubbed(readings, force, noise: float, forgiven: float, x0: float) -> Innovations:
+    """Innovations of the true structure on readings (n,) of the acceleration."""
+    n = readings.shape[0]
+    return RUN(
+        lower(RUBBED, ACCELERATION),
+        readout(ACCELERATION, 1),
+        excitation(jfsm.Record(STEP * np.arange(n), force), 1, SUBSTEPS, "band-limited"),
+        Readings(readings[:, None], jnp.ones((n, 1)), jnp.asarray([noise**2]), jnp.ones(n)),
+        ProcessNoise(jnp.asarray([[forgiven**2]])),
+        Start(jnp.asarray([x0]), jnp.zeros(1), jnp.diag(jnp.asarray([1e-12, 1e-12]))),
+        jnp.zeros(1),
+    )
+
+
+@pytest.mark.parametrize("noise", [0.01, 0.1, 0.4])
+def test_a_motion_that_rubs_to_a_stop_leaves_nothing_but_its_noise(noise):
+    """While it rests, friction of every size up to the limit is a reading of zero: nothing else is to be chosen."""
+    n, x0 = 2000, 1.13
+    white = noise * np.random.default_rng(11).standard_normal(n)
+    true = rubbing(n, x0=x0)
+    assert 100 < np.flatnonzero(true)[-1] < 200, "it slides for some periods, and rests most of the time"
+    found = rubbed(jnp.asarray(true + white), np.zeros(n), noise, 1e-5, x0)
+    error, variance, log_share = (np.asarray(array)[:, 0] for array in found)
+    # Mean squares of so many normal numbers scatter by 3 %; what the noise's own is, is known.
+    assert np.mean(error**2 / variance) == pytest.approx(np.mean((white / noise) ** 2), rel=0.01)
+    assert np.max(np.abs(error) / np.sqrt(variance)) < 4.5
+    likelihood = np.sum(log_share - (error**2 / variance + np.log(variance)) / 2)
+    assert likelihood == pytest.approx(-np.sum((white / noise) ** 2 / 2 + np.log(noise)), abs=3.0)
+
+
+def test_a_link_that_is_put_to_rest_too_early_is_no_surprise():
+    """The force is known to some per cent, so that the instant of an arrest is not known to the sample."""
+    n, noise, rng = 3000, 0.02, np.random.default_rng(12)
+    omegas, phases = np.array([1.1, 1.7, 2.3, 4.1]), rng.uniform(0, 2 * np.pi, 4)
+
+    def force(t):
+        return np.array([0.55 * np.sum(np.cos(omegas * t + phases))])
+
+    disturbance = 0.05 * rng.standard_normal(n)
+    measured = np.array([force(t)[0] for t in STEP * np.arange(n)]) + disturbance
+    true = rubbing(n, force)
+    arrests = np.flatnonzero((true[1:] == 0) & (true[:-1] != 0))
+    assert arrests.size > 20
+    readings = jnp.asarray(true + noise * rng.standard_normal(n))
+    error, variance, log_share = (
+        np.asarray(array)[:, 0] for array in rubbed(readings, measured, np.hypot(noise, 0.05), 0.05 * STEP, 0.0)
+    )
+    assert np.max(np.abs(error) / np.sqrt(variance)) < 5.0
+    assert np.min(log_share) > np.log(0.002)
+
+
+def test_what_a_reading_may_be_adds_up_to_certainty():
+    """While it slides, where it turns, where it comes to rest, and at rest; with a speed that is known badly."""
+    n, noise, x0 = 90, 0.3, 0.43
+    exact = rubbing(n, x0=x0)
+    assert np.all(exact[-20:] == 0) and exact[-40] != 0
+    true = exact + noise * np.random.default_rng(13).standard_normal(n)
+    grid = jnp.arange(-7.0, 7.0, 0.15)
+
+    def density(k, y):
+        readings = jnp.where(jnp.arange(n) == k, y, true)
+        error, variance, log_share = (array[k, 0] for array in rubbed(readings, np.zeros(n), noise, 0.03, x0))
+        return jnp.exp(log_share - error**2 / (2 * variance)) / jnp.sqrt(2 * jnp.pi * variance)
+
+    of_all = jax.jit(jax.vmap(jax.vmap(density, (None, 0)), (0, None)))(jnp.arange(0, n, 3), grid)
+    several = np.sum(np.diff(np.sign(np.diff(of_all, axis=1)), axis=1) < 0, axis=1) > 1
+    assert 2 < np.sum(several) < 30, "at some samples there is more than one thing that a reading may be"
+    np.testing.assert_allclose(np.sum(of_all, axis=1) * 0.15, 1.0, rtol=1e-6)

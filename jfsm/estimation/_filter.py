@@ -3,7 +3,8 @@
 The state is (x, v, z), z being the hidden states of the laws. Between samples the mean follows the plant itself
 (Runge-Kutta, true stick), the covariance its linearisation. Channels are taken one after the other, so that no matrix
 is inverted and many filters run side by side. The mode of friction is uncertain while the speed is smaller than its
-error: an acceleration is then judged under each mode, and the most probable one is used (a max-mixture).
+error: an acceleration is then judged under each mode, and the most probable one is used (a max-mixture). Its likelihood
+is that of all modes, each with its probability before the reading.
 """
 
 from typing import NamedTuple
@@ -30,6 +31,12 @@ from ..dynamics._stepper import (
 
 _NOTHING = 1e-6
 """Change of a resting link's speed that is none, as a share of what the process noise makes of it in a sample."""
+_UNFORESEEN = 1e-4
+"""Probability that a link does what the estimated motion rules out."""
+_FAR = 30.0
+"""Standard deviations from zero at which a speed's sign is beyond doubt."""
+_BARELY = 1e-3
+"""Standard deviations beyond zero that tell a direction, no more."""
 _SMALL = 8
 """Columns of a matrix up to which its product is written out."""
 
@@ -66,10 +73,16 @@ class Start(eqx.Module):
 
 
 class Innovations(NamedTuple):
-    """Difference between reading and prediction, and its variance, each (n, channels)."""
+    """Difference between reading and prediction, and its variance, each (n, channels).
+
+    Where the reading has chosen among several predictions, its law is not the normal one of that prediction but the
+    mixture of all: `log_share` is the logarithm of the mixture's density over the normal one, zero where there is but
+    one prediction. Without it a law that offers two predictions would score as if each had been certain.
+    """
 
     error: Float[Array, "n channels"]
     variance: Float[Array, "n channels"]
+    log_share: Float[Array, "n channels"]
 
 
 def _product(a, b):
@@ -105,12 +118,12 @@ def innovations(
     nothing = _NOTHING * jnp.sqrt(jnp.sum(rows[:, :, None] * noise.velocity[None] * rows[:, None, :], (1, 2)))
 
     def body(carry, inputs):
-        motion, past, covariance = carry
+        motion, past, covariance, overrun = carry
         force, base, time, y, use, valid, before = inputs
         g = load_of(plant, minv, motion, past, force, base, time, dt)
-        mean, updated, error, spread = _update(
-            plant, minv, show, motion, covariance, Load(g[:3], base[:3], time, dt / fine.substeps), before, y, use,
-            variances, nothing,
+        mean, updated, found = _update(
+            plant, minv, show, motion, covariance, overrun, Load(g[:3], base[:3], time, dt / fine.substeps), before, y,
+            use, variances, nothing,
         )  # fmt: skip
         x, v, z = mean[:dof], mean[dof : 2 * dof], mean[2 * dof :]
         # A link that sticks stays so while the update leaves it at rest; otherwise its speed decides.
@@ -120,17 +133,17 @@ def innovations(
         motion = Motion(x, v, settle(plant, x, z), mode_at(plant, minv, x, v, z, g[0], time, still))
         after = advance_sample(plant, minv, motion, g, base, time, dt)
         step = _transition(plant, minv, motion, after, time, dt, fine.substeps)
-        propagated = _rest(plant, minv, _product(_product(step, updated), step.T) + added, after.mode)
+        moving = _product(_product(step, updated), step.T) + added
+        overrun = _overrun(plant, minv, motion, after, moving, g[0], time, dt)
         keep = valid > 0
-        onward = (after, remember(past, x, v), propagated)
-        return jax.tree.map(
-            lambda new, old: jnp.where(keep, new, old), onward, (motion, past, covariance)
-        ), Innovations(error, spread)
+        onward = (after, remember(past, x, v), _rest(plant, minv, moving, after.mode), overrun)
+        return jax.tree.map(lambda new, old: jnp.where(keep, new, old), onward, carry), found
 
     motion, past = begin(plant, minv, start.x, start.v, fine)
     before = tuple(drive_before(fine, tau) for tau in plant.channel_delay)
     inputs = (fine.force, fine.base, fine.time, readings.values, readings.use, readings.valid, before)
-    return jax.lax.scan(body, (motion, past, start.covariance), inputs)[1]
+    carry = (motion, past, start.covariance, jnp.full(len(rows), _FAR))
+    return jax.lax.scan(body, carry, inputs)[1]
 
 
 def _transition(plant, minv, before: Motion, after: Motion, time, dt, substeps: int):
@@ -174,23 +187,42 @@ def _rest(plant, minv, covariance, mode):
     return covariance
 
 
-def _update(plant, minv, show, motion: Motion, covariance, load: Load, before, y, use, variances, nothing):
-    """State after the readings of one sample, and their innovations; `load` is that of the sample's first step,
-    `before` what drove it earlier, and speeds of links up to `nothing` are none."""
+def _overrun(plant, minv, before: Motion, after: Motion, covariance, g, time, dt):
+    """Speed with which every link that came to rest in a sample would have ended it unheld, in its standard deviations.
+
+    The closer to zero, the less certain it is that the link rests by then. All others are beyond doubt.
+    """
+    rows, dof = plant.friction.direction, plant.dof
+    x, v, z = ((a + b) / 2 for a, b in zip(before[:3], after[:3], strict=True))
+    slope = acceleration(plant, minv, x, v, z, before.mode, g[g.shape[0] // 2], time + dt / 2)[0]
+    speed = before.mode * jnp.sum(rows * (before.v + dt * slope)[None, :], 1)
+    power = jnp.sum(rows[:, :, None] * covariance[None, dof : 2 * dof, dof : 2 * dof] * rows[:, None, :], (1, 2))
+    stopped = (before.mode != 0) & (after.mode == 0) & (power > 0)
+    beyond = jnp.minimum(speed / jnp.sqrt(jnp.where(stopped, power, 1.0)), -_BARELY)
+    return jnp.where(stopped, before.mode * beyond, _FAR)
+
+
+def _update(
+    plant, minv, show, motion: Motion, covariance, overrun, load: Load, before, y, use, variances, nothing
+) -> tuple[Float[Array, " state"], Float[Array, "state state"], Innovations]:
+    """State after the readings of one sample, and their innovations; `overrun` tells how surely links rest, `load` is
+    that of the sample's first step, `before` what drove it earlier, and speeds of links up to `nothing` are none."""
     mean = at_first = jnp.concatenate([motion.x, motion.v, motion.z])
     late = [
         (channel, *_late(plant, minv, show, tau, mean, motion.mode, load, *drive))
         for tau, channel, drive in zip(plant.channel_delay, plant.late_channel, before, strict=True)
     ]
-    errors, spreads = [], []
+    errors, spreads, shares = [], [], []
     for c in range(y.shape[0]):
         gain = 1.0 + plant.channel_gain[c]
-        predicted, row = _predict(
-            plant, minv, show, c, mean, covariance, motion.mode, load, y[c], variances[c], gain, nothing
-        )
+        predicted, row, share = _predict(
+            plant, minv, show, c, mean, covariance, motion.mode, overrun, load, y[c], use[c], variances[c], gain,
+            nothing,
+        )  # fmt: skip
         for channel, then, rows in late:  # what other channels have told of the motion by now moves it along its slope
             predicted = jnp.where(channel == c, then[c] + jnp.sum(rows[c] * (mean - at_first)), predicted)
             row = jnp.where(channel == c, rows[c], row)
+            share = jnp.where(channel == c, 0.0, share)
         error = y[c] - gain * predicted - plant.channel_offset[c]
         row = gain * row
         cross = jnp.sum(covariance * row[None, :], 1)
@@ -200,22 +232,25 @@ def _update(plant, minv, show, motion: Motion, covariance, load: Load, before, y
         covariance = covariance - weight[:, None] * cross[None, :]
         errors.append(error)
         spreads.append(spread)
-    return mean, covariance, jnp.stack(errors), jnp.stack(spreads)
+        shares.append(share)
+    return mean, covariance, Innovations(jnp.stack(errors), jnp.stack(spreads), jnp.stack(shares))
 
 
-def _predict(plant, minv, show, c, mean, covariance, mode, load: Load, y, variance, gain, nothing):
-    """Reading of channel `c` without gain and offset, and its derivative by the state."""
-    dof = plant.dof
+def _predict(plant, minv, show, c, mean, covariance, mode, overrun, load: Load, y, use, variance, gain, nothing):
+    """Reading of channel `c` without gain and offset, its derivative by the state, and the reading's `log_share`."""
+    dof, certain = plant.dof, jnp.zeros(())
     select, none, hidden = show.select[c], jnp.zeros(dof), jnp.zeros(plant.hidden)
     if show.kinds[c] == "displacement":
-        return jnp.sum(select * mean[:dof]), jnp.concatenate([select, none, hidden])
+        return jnp.sum(select * mean[:dof]), jnp.concatenate([select, none, hidden]), certain
     if show.kinds[c] == "velocity":
-        return jnp.sum(select * mean[dof : 2 * dof]), jnp.concatenate([none, select, hidden])
+        return jnp.sum(select * mean[dof : 2 * dof]), jnp.concatenate([none, select, hidden]), certain
     if len(plant.friction) == 1:
-        a, by_state = _most_probable_mode(plant, minv, select, c, mean, covariance, load, y, variance, gain, nothing[0])
+        a, by_state, log_share = _most_probable_mode(
+            plant, minv, select, c, mean, covariance, mode[0], overrun[0], load, y, use, variance, gain, nothing[0]
+        )
     else:
-        a, by_state = _acceleration_and_slope(plant, minv, mean, mode, load)
-    return jnp.sum(select * (a + load.base[0])), jnp.sum(select[:, None] * by_state, 0)
+        (a, by_state), log_share = _acceleration_and_slope(plant, minv, mean, mode, load), certain
+    return jnp.sum(select * (a + load.base[0])), jnp.sum(select[:, None] * by_state, 0), log_share
 
 
 def _late(plant, minv, show, tau, mean, mode, load: Load, force, base):
@@ -256,32 +291,43 @@ def _held(plant, minv, by_state, sticking):
     return by_state
 
 
-def _most_probable_mode(plant, minv, select, c, mean, covariance, load: Load, y, variance, gain, nothing):
-    """Acceleration and slope in the mode that the reading and the estimated speed make most probable."""
+def _most_probable_mode(
+    plant, minv, select, c, mean, covariance, mode, overrun, load: Load, y, use, variance, gain, nothing
+):
+    """Acceleration and slope in the mode that the reading and the estimated speed make most probable, and the
+    reading's `log_share`.
+
+    A reading that is not used has no say in the mode.
+    """
     dof = plant.dof
     row = plant.friction.direction[0]
     x, v, z = mean[:dof], mean[dof : 2 * dof], mean[2 * dof :]
     speed = jnp.sum(row * v)
     power = jnp.sum(row[:, None] * covariance[dof : 2 * dof, dof : 2 * dof] * row[None, :])
     spread = jnp.sqrt(jnp.maximum(power, 0.0) + nothing**2)
-    certain = jnp.where(spread > 0, speed / jnp.where(spread > 0, spread, 1.0), jnp.sign(speed) * 40.0)
+    certain = jnp.where(spread > 0, speed / jnp.where(spread > 0, spread, 1.0), jnp.sign(speed) * _FAR)
     low, high = friction_limits(plant, x, jnp.zeros(dof), load.time)
     free = free_acceleration(plant, minv, x, v, z, load.force[0], load.time)
     held = holding_force(plant, minv, free, jnp.ones(1, bool))[0]
     can_stick = (held <= high[0]) & (held >= low[0])
-    weights = (
-        jax.scipy.stats.norm.logcdf(jnp.clip(certain, -30.0, 30.0)),
-        jax.scipy.stats.norm.logcdf(jnp.clip(-certain, -30.0, 30.0)),
-        jnp.where(can_stick, -jnp.minimum(certain**2, 900.0) / 2, -1e6),
+    # What comes to rest where it can be held stays there: it slides still as it did, or it rests.
+    came = jnp.where(mode == 0, -jnp.sign(overrun), mode)
+    certain = jnp.clip(jnp.where(can_stick & (mode == 0), overrun, certain), -_FAR, _FAR)
+    forward, backward = (
+        jnp.where(can_stick & (came != way), 0.0, jax.scipy.stats.norm.cdf(way * certain)) for way in (1.0, -1.0)
     )
+    likely = jnp.stack([forward, backward, 1.0 - forward - backward])
+    log_likely = jnp.log(_UNFORESEEN / 3 + (1.0 - _UNFORESEEN) * likely)
 
-    def judge(mode, weight):
+    def judge(mode):
         a, by_state = _acceleration_and_slope(plant, minv, mean, mode[None], load)
         line = gain * jnp.sum(select[:, None] * by_state, 0)
         total = jnp.sum(line[:, None] * covariance * line[None, :]) + variance
         error = y - gain * jnp.sum(select * (a + load.base[0])) - plant.channel_offset[c]
-        return weight - error**2 / (2 * total) - jnp.log(total) / 2, a, by_state
+        return -(error**2) / (2 * total) - jnp.log(total) / 2, a, by_state
 
-    scores, values, slopes = jax.vmap(judge)(jnp.array([1.0, -1.0, 0.0]), jnp.stack(weights))
+    normal, values, slopes = jax.vmap(judge)(jnp.array([1.0, -1.0, 0.0]))
+    scores = log_likely + jnp.where(use > 0, normal, 0.0)
     best = jax.nn.one_hot(jnp.argmax(jax.lax.stop_gradient(scores)), 3)
-    return jnp.sum(best[:, None] * values, 0), jnp.sum(best[:, None, None] * slopes, 0)
+    log_share = jax.nn.logsumexp(scores) - jnp.sum(best * jnp.where(use > 0, normal, 0.0))
+    return jnp.sum(best[:, None] * values, 0), jnp.sum(best[:, None, None] * slopes, 0), log_share

@@ -67,7 +67,8 @@ def force_innovations(
     inputs = (error.enters, error.follow, error.fresh, rows, apart, white, use)
     _, (errors, variances) = jax.lax.scan(body, (jnp.zeros((dof, 6)), start), inputs)
     none = jnp.zeros(readings.values.shape)
-    return Innovations(none.at[:, jnp.array(forces)].set(errors), (none + 1.0).at[:, jnp.array(forces)].set(variances))
+    variances = (none + 1.0).at[:, jnp.array(forces)].set(variances)
+    return Innovations(none.at[:, jnp.array(forces)].set(errors), variances, none)
 
 
 def _followed(columns: Float[Array, "dof 6 width"], enters, follow) -> Float[Array, "dof 6 width"]:

@@ -74,17 +74,18 @@ def derivatives(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, 
     def one(plant, base, rows, unit, log, theta):
         def outcome(theta):
             found = _run(plant, (base, rows, unit, log), theta, show, fine, readings, noise, doubt)
-            return found.error, jnp.log(found.variance)
+            return found.error, jnp.log(found.variance), found.log_share
 
         push = partial(jax.jvp, outcome, (theta,))
-        (error, log_variance), (by_error, by_variance) = jax.vmap(push, out_axes=(None, 0))((jnp.eye(theta.size),))
+        (error, log_variance, log_share), slopes = jax.vmap(push, out_axes=(None, 0))((jnp.eye(theta.size),))
+        by_error, by_variance, by_share = slopes
         root = jnp.sqrt(counted)
         deviation = root * jnp.exp(-log_variance / 2)
         e, de, ds = error * deviation, by_error * deviation[None], by_variance * root[None]
-        value = 0.5 * jnp.sum(e**2 + counted * (log_variance + jnp.log(2 * jnp.pi)))
-        de, ds = (array.reshape(theta.size, -1) for array in (de, ds))
+        value = jnp.sum(0.5 * e**2 + counted * (0.5 * log_variance + 0.5 * jnp.log(2 * jnp.pi) - log_share))
+        de, ds, by_share = (array.reshape(theta.size, -1) for array in (de, ds, counted[None] * by_share))
         # d(log L)/d(theta) of every reading; their sum is the gradient, their sums over stretches tell how it scatters.
-        scores = de * e.ravel()[None] + 0.5 * ds * (root - e**2 / jnp.maximum(root, 1e-30)).ravel()[None]
+        scores = de * e.ravel()[None] + 0.5 * ds * (root - e**2 / jnp.maximum(root, 1e-30)).ravel()[None] - by_share
         block = jnp.arange(counted.shape[0]) * _BLOCKS // jnp.maximum(until, 1)
         inside = jax.nn.one_hot(block, _BLOCKS, dtype=scores.dtype)
         stretches = jnp.sum(scores.reshape(theta.size, counted.shape[0], -1), 2) @ inside

@@ -169,7 +169,7 @@ class Posterior:
             _doubt(plant, nuisances),
         )
         n = nuisances.samples
-        return Innovations(np.asarray(found.error)[0, :n], np.asarray(found.variance)[0, :n])  # pyright: ignore[reportArgumentType]
+        return Innovations(*(np.asarray(array)[0, :n] for array in found))  # pyright: ignore[reportArgumentType]
 
     def structure(self, theta: np.ndarray, lane: int = 0) -> Structure:
         """The structure with the values of one lane."""
