@@ -81,8 +81,8 @@ def answer(monkeypatch, verdict: str = "consistent") -> dict[str, Any]:
     """Lets `diagnose` return this verdict at once; what it was called with appears in the dictionary."""
     seen: dict[str, Any] = {}
 
-    def quick(record, model, holdout, causes, key, progress):
-        seen.update(record=record, model=model, holdout=holdout, causes=causes, key=key)
+    def quick(record, model, holdout, causes, max_causes, key, progress):
+        seen.update(record=record, model=model, holdout=holdout, causes=causes, max_causes=max_causes, key=key)
         progress("looking", 1, 4)
         return FakeDiagnosis(verdict=verdict)
 
@@ -433,7 +433,7 @@ def test_a_mended_model_keeps_its_map_in_a_file_beside_it(channels, folder, tmp_
 def test_a_diagnosis_looks_for_the_causes_that_it_is_asked_for(folder, channels, monkeypatch):
     seen = answer(monkeypatch)
     run("diagnose", *channels, "--model", folder / "model.toml")
-    assert seen["causes"] is None
+    assert (seen["causes"], seen["max_causes"]) == (None, 2)
     run("diagnose", *channels, "--model", folder / "model.toml", "--cause", "jenkins", "--cause", "maxwell")
     assert seen["causes"] == ["jenkins", "maxwell"]
 

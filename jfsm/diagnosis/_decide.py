@@ -62,9 +62,12 @@ def adequate(trial: Trial) -> bool:
     return trial.whiteness < _WHITE and bool(np.all(scales < _SCALE)) and trial.prediction.left < NEGLIGIBLE
 
 
-def something_left(trials: Sequence[Trial]) -> bool:
-    """Whether the best of them leaves more than noise."""
-    return not adequate(max(trials, key=lambda t: t.evidence))
+def something_left(trials: Sequence[Trial], refitted: Trial, *, imposed: bool) -> bool:
+    """Whether the best of them leaves enough for a second effect to be worth a search: what a pair has to gain."""
+    best = max(trials, key=lambda t: t.evidence)
+    if adequate(best) or best.prediction.left < NEGLIGIBLE or (imposed and _almost_all(best, refitted)):
+        return False
+    return bool(np.all(best.prediction.excess >= _WORTH_A_SECOND**2 * refitted.prediction.error))
 
 
 def strained(trials: Sequence[Trial]) -> bool:

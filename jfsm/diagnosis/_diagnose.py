@@ -17,7 +17,6 @@ from ._clipped import beside_clipping, limited
 from ._decide import decide, something_left, strained
 from ._detectable import also_detectable
 from ._diagnosis import Diagnosis
-from ._effect import Effect
 from ._gain import measure_gain
 from ._report import Tested, assemble
 from ._residual import residual, stand_in
@@ -103,15 +102,18 @@ def diagnose(
         records = prepare_all(whole, model, reconstruction, weighed=refitted.structure)
         given = fit_model("given", model, records, until, refit=False)
         refitted = fit_model("refitted", model, records, until, refit=True)
+    imposed = records[0].path is not None
     trials, behind = search(tried, model, given, refitted, records, until, steps.next)
     if max_causes > 1:
-        effects = _beside([given, refitted, *trials], [effect for candidate in every for effect in candidate.effects])
+        alone = [given, refitted, *trials]
+        effects = [effect for candidate in every for effect in candidate.effects]
+        if not something_left(alone, refitted, imposed=imposed):  # a gain may hide in own values
+            effects = [e for e in effects if e.cause.effect in (ForceGain, AccelerationGain) and strained(alone)]
         if effects:
             found = search_pairs(effects, trials, model, refitted, records, until, steps.next)
             trials, behind = trials + found.trials, behind + found.behind
     steps.next("the missing force")
     periods = sum(n.record.duration for n in records) * records[0].omega / (2 * math.pi)
-    imposed = records[0].path is not None
     decision = decide(given, refitted, trials, lambda t: stand_in(t, records, until), periods, imposed=imposed)
     if clipped:
         decision = beside_clipping(decision, clipped, refitted)
@@ -137,14 +139,6 @@ def diagnose(
         unseen = also_detectable(left_out + laws, model, records, until)
     tested = Tested(trials, behind, left_out, unseen)
     return assemble(decision, clipped, refitted, tested, model, extended, records, missing, gain, runs)
-
-
-def _beside(trials: Sequence[Trial], effects: list[Effect]) -> list[Effect]:
-    """Effects that are worth a try beside another: all where something is left, gains where own values are strained."""
-    if something_left(trials):
-        return effects
-    gains = (ForceGain, AccelerationGain)
-    return [effect for effect in effects if effect.cause.effect in gains] if strained(trials) else []
 
 
 def _outweighed(model: Structure, refitted: Structure) -> bool:

@@ -224,7 +224,8 @@ def can_tell(cause: str, channel_set: str, excitation: str) -> bool:
     response channel that is late is a shifted clock where nothing else tells the time, and under one line the phase of
     another damping. So is a late force, and a law that is linear but for its memory. A change with time is a change
     with amplitude in a single decay. A preload is an offset, but for the swing with which it sets in on a plant that is
-    known to be at rest.
+    known to be at rest. Friction that differs with the direction is even friction about another point of rest, of which
+    acceleration alone tells nothing.
     """
     decays, one_line = excitation == "free_decay", excitation == "harmonic"
     if cause == "force_gain":
@@ -245,7 +246,7 @@ def can_tell(cause: str, channel_set: str, excitation: str) -> bool:
         return not decays
     if cause == "preload":
         return not decays and channel_set != "a"
-    return True
+    return cause != "coulomb_asymmetric" or channel_set != "a"
 
 
 def _fair_question(rng: np.random.Generator, cause: str, excitation: str) -> tuple[Plant, Drive, State, Law, Motion]:

@@ -534,6 +534,8 @@ def test_a_clipped_channel_shows_nothing_beyond_its_limit_noise_included():
         ("stiffness_drift", "xva", "free_decay", False),
         ("parametric_stiffness", "x", "harmonic", True),
         ("clipping", "a", "free_decay", True),
+        ("coulomb_asymmetric", "a", "noise", False),
+        ("coulomb_asymmetric", "x", "free_decay", True),
     ],
 )
 def test_no_cause_is_asked_for_that_the_record_could_not_tell(cause: str, channels: str, excitation: str, tells: bool):
