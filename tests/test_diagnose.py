@@ -239,11 +239,11 @@ def test_laws_of_a_class_share_one_program(believed, monkeypatch):
     monkeypatch.setattr(_likelihood, "_run", lambda *a: traced.append(1) or original(*a))
     jax.clear_caches()
     jfsm.diagnose(made(duffing, samples=400), believed, causes=FEW, key=jax.random.key(0))
-    # One program with derivatives and one without, for smooth laws and for friction: no other place, sign or law.
-    assert 0 < len(traced) <= 4
-    traced.clear()
+    assert traced
     jfsm.diagnose(made(duffing, samples=390, seed=5), believed, causes=FEW, key=jax.random.key(0))
-    assert not traced
+    # One program with derivatives and one without, for smooth laws and for friction: for no other record, place, sign
+    # or law. One without derivatives is made only once such a law is pursued.
+    assert len(traced) <= 4
 
 
 @pytest.mark.parametrize(
