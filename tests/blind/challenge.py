@@ -1,8 +1,8 @@
 """One challenge is one seed: a plant, what is wrong about the belief in it, and a noisy record."""
 
 import dataclasses
-from collections.abc import Collection, Sequence
-from typing import Any
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from .laws import FIRST_LAWS, LAWS, Law, NoLaw, Scene
 from .plants import EscapeError, Motion, Plant, State
 from .sensors import DELAYS, FIRST_SENSORS, SENSORS, UNITS, Channels, Sensor, with_noise
 from .sketch import sketch
+
+Hidden = TypeVar("Hidden")
 
 CAUSES = ("none", *LAWS, *SENSORS, *WRONG_VALUES)
 # Nothing, seven hidden effects and the wrong values. A seed draws among the causes that it is asked for, so what it
@@ -117,20 +119,8 @@ def draw(
         If a name is unknown, or if no cause asked for can be told from the records asked for.
     """
     choice, physics, static = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
-    sets = named("channels", channels, CHANNEL_SETS)
-    drives = named("excitation", tuple(DRIVES) if excitation is None else excitation, DRIVES)
-    settings = {
-        cause: [(s, e) for s in sets for e in drives if can_tell(cause, s, e)]
-        for cause in named("causes", causes, CAUSES)
-    }
-    open_causes = [cause for cause, pairs in settings.items() if pairs]
-    if not open_causes:
-        raise ValueError(
-            f"`causes` must hold one that can be told from channels {sets} under {drives}; got {tuple(settings)}. "
-            "Allow more channel sets or excitations."
-        )
-    cause = open_causes[choice.integers(len(open_causes))]
-    channel_set, excitation = settings[cause][choice.integers(len(settings[cause]))]
+    wanted = {cause: (cause,) for cause in named("causes", causes, CAUSES)}
+    cause, channel_set, excitation = drawn_setting(choice, "causes", wanted, channels, excitation)
     level = float(choice.choice(np.atleast_1d(noise)))
 
     plant, drive, start, law, motion = _fair_question(physics, cause, excitation)
@@ -167,6 +157,36 @@ def draw(
         at_rest=start == (0.0, 0.0) and (bool(choice.random() < 0.5) or cause in NEEDS_REST),
         share=share, left=left, law=law, drive=drive, start=start, motion=motion,
     )  # fmt: skip
+
+
+def drawn_setting(
+    choice: np.random.Generator,
+    argument: str,
+    wanted: Mapping[Hidden, Sequence[str]],
+    channels: str | Sequence[str],
+    excitation: str | Sequence[str] | None,
+) -> tuple[Hidden, str, str]:
+    """One of what may be hidden, each with its causes, and a channel set and an excitation that can tell them all.
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown, or if none of `argument` can be told from the records asked for.
+    """
+    sets = named("channels", channels, CHANNEL_SETS)
+    drives = named("excitation", tuple(DRIVES) if excitation is None else excitation, DRIVES)
+    settings = {
+        hidden: [(s, e) for s in sets for e in drives if all(can_tell(cause, s, e) for cause in causes)]
+        for hidden, causes in wanted.items()
+    }
+    able = [hidden for hidden, records in settings.items() if records]
+    if not able:
+        raise ValueError(
+            f"`{argument}` must hold one that can be told from channels {sets} under {drives}; got {tuple(settings)}. "
+            "Allow more channel sets or excitations."
+        )
+    hidden = able[choice.integers(len(able))]
+    return hidden, *settings[hidden][choice.integers(len(settings[hidden]))]
 
 
 def true_channels(drive: Drive, motion: Motion, kinds: Sequence[str]) -> Channels:

@@ -15,15 +15,14 @@ from .challenge import (
     NOISE_LEVELS,
     Challenge,
     Effect,
-    can_tell,
     draw_motion,
     draw_plant,
-    named,
+    drawn_setting,
     true_channels,
     trusted_motion,
     with_earlier,
 )
-from .drives import DRIVES, Drive
+from .drives import Drive
 from .laws import LAWS, Both, Law, Scene
 from .laws.base import log_uniform
 from .plants import EscapeError, Motion, Plant, State
@@ -122,20 +121,8 @@ def draw_two(
         If a name or a pair is unknown, or if no pair asked for can be told from the records asked for.
     """
     choice, physics, static = (np.random.default_rng(s) for s in np.random.SeedSequence((seed, 2)).spawn(3))
-    sets = named("channels", channels, CHANNEL_SETS)
-    drives = named("excitation", tuple(DRIVES) if excitation is None else excitation, DRIVES)
-    wanted = PAIRS if pairs is None else _known(pairs)
-    settings = {
-        pair: [(s, e) for s in sets for e in drives if all(can_tell(cause, s, e) for cause in pair)] for pair in wanted
-    }
-    open_pairs = [pair for pair, records in settings.items() if records]
-    if not open_pairs:
-        raise ValueError(
-            f"`pairs` must hold one that can be told from channels {sets} under {drives}; got {tuple(settings)}. "
-            "Allow more channel sets or excitations."
-        )
-    pair = open_pairs[choice.integers(len(open_pairs))]
-    channel_set, excitation = settings[pair][choice.integers(len(settings[pair]))]
+    wanted = {pair: pair for pair in (PAIRS if pairs is None else _known(pairs))}
+    pair, channel_set, excitation = drawn_setting(choice, "pairs", wanted, channels, excitation)
     level = float(choice.choice(np.atleast_1d(noise)))
     kinds = (() if excitation == "free_decay" else ("force",)) + CHANNEL_SETS[channel_set]
 
