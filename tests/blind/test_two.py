@@ -15,6 +15,7 @@ from .exact import integrate
 from .laws import LAWS, Both, NoLaw, Scene
 from .plants import EscapeError, Motion, Plant
 from .sensors import SENSORS
+from .test_laws import truth_of
 from .two import LARGEST_OVERLAP, SHARES, Pair, family, overlap
 
 DRAWN: dict[Pair, tuple[str, str]] = {  # pair -> excitation, channels
@@ -32,14 +33,6 @@ WITH_SENSOR = [pair for pair in DRAWN if pair[1] in SENSORS]
 def drawn(pair: Pair) -> Challenge:
     excitation, channels = DRAWN[pair]
     return draw_two(1, noise=0.01, excitation=excitation, channels=channels, pairs=(pair,))
-
-
-def truth_of(challenge: Challenge) -> dict[str, FloatArray]:
-    motion = challenge.motion
-    return {
-        "force": challenge.drive(motion.time), "displacement": motion.x, "velocity": motion.v,
-        "acceleration": motion.acceleration,
-    }  # fmt: skip
 
 
 def forces(challenge: Challenge) -> list[FloatArray]:
