@@ -131,6 +131,13 @@ class Plant(eqx.Module):
         return self.mass.shape[0]
 
     @property
+    def named(self) -> bool:
+        """Whether all its laws are the library's own: no maps, and none that users wrote."""
+        slots = (self.smooth, self.friction, self.memory, self.delayed)
+        tables = (SMOOTH_TERMS, FRICTION_TERMS, MEMORY_TERMS, DELAYED_TERMS)
+        return not self.maps and all(s.laws == table for s, table in zip(slots, tables, strict=True))
+
+    @property
     def hidden(self) -> int:
         """Number of hidden states."""
         return len(self.memory) * hidden_width(self.memory)
@@ -165,7 +172,13 @@ def hidden_width(memory: Slots) -> int:
     return max(HIDDEN_STATES, *(law.states for law in memory.laws))
 
 
-def lower(
+def lower(structure: Structure, channels: Sequence[Channel] = (), **how: Any) -> Plant:
+    """Plant of a structure, on the device; see `numbers_of`."""
+    arrays, rest = eqx.partition(numbers_of(structure, channels, **how), lambda leaf: isinstance(leaf, np.ndarray))
+    return eqx.combine(jax.device_put(arrays), rest)
+
+
+def numbers_of(
     structure: Structure,
     channels: Sequence[Channel] = (),
     *,
@@ -173,7 +186,7 @@ def lower(
     grid: Grid | None = None,
     rolled: bool = False,
 ) -> Plant:
-    """Plant of a structure.
+    """Plant of a structure, its arrays those of NumPy.
 
     Parameters
     ----------
@@ -217,22 +230,25 @@ def lower(
         late, shifted = isinstance(sensor, ForceDelay), isinstance(sensor, Offset | AccelerationBias)
         row[2 if late else 1 if shifted else 0][place] += sensor.value
     kinds = {type(sensor) for sensor in structure.sensors}
+    arrays: dict[str, Any] = {
+        "mass": np.diag(mass) if mass.ndim == 1 else mass,
+        "damping": matrices[LinearDamping],
+        "stiffness": matrices[LinearStiffness],
+        "force_gain": force_gain,
+        "force_offset": force_offset,
+        "channel_gain": channel_gain,
+        "channel_offset": channel_offset,
+        "force_delay": force_delay if ForceDelay in kinds else np.zeros(0),
+        "channel_delay": np.array(list(channel_delay.values()), dtype=float),
+        "late_channel": np.array(list(channel_delay), dtype=int),
+    }
     return Plant(
-        mass=jnp.asarray(np.diag(mass) if mass.ndim == 1 else mass),
-        damping=jnp.asarray(matrices[LinearDamping]),
-        stiffness=jnp.asarray(matrices[LinearStiffness]),
+        **arrays,
         smooth=_slots(smooth, SMOOTH_TERMS, max(smooth_slots, len(smooth)), dof, 0.0 if grid is None else grid.ramp),
         friction=_slots(friction, FRICTION_TERMS, len(friction), dof),
         memory=_slots(memory, MEMORY_TERMS, len(memory), dof),
         delayed=_slots(delayed, DELAYED_TERMS, len(delayed), dof),
         maps=tuple(maps),
-        force_gain=jnp.asarray(force_gain),
-        force_offset=jnp.asarray(force_offset),
-        channel_gain=jnp.asarray(channel_gain),
-        channel_offset=jnp.asarray(channel_offset),
-        force_delay=jnp.asarray(force_delay if ForceDelay in kinds else np.zeros(0)),
-        channel_delay=jnp.asarray(list(channel_delay.values()), dtype=float),
-        late_channel=jnp.asarray(list(channel_delay), dtype=int),
         reach=_REACH if grid is None else grid.reach(delayed),
         rolled=rolled,
     )
@@ -242,10 +258,11 @@ def _slots(terms: list, laws: tuple[type, ...], count: int, dof: int, ramp: floa
     laws = laws + tuple(dict.fromkeys(type(term) for term in terms if type(term) not in laws))
     widest = max([LAW_PARAMETERS, *(len(term.values) for term in terms)])
     kind, parameters, directions = np.zeros(count, np.int32), np.zeros((count, widest)), np.zeros((count, dof))
+    arrays: dict[str, Any] = {"kind": kind, "parameters": parameters, "direction": directions}
     for i, term in enumerate(terms):
         kind[i] = laws.index(type(term))
         parameters[i, : len(term.values)] = [float(value) for value in term.values]
         if isinstance(term, StiffnessDrop):
             parameters[i, len(term.values)] = ramp
         directions[i] = direction(term.at, dof)
-    return Slots(jnp.asarray(kind), jnp.asarray(parameters), jnp.asarray(directions), laws)
+    return Slots(**arrays, laws=laws)

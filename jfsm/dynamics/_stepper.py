@@ -86,7 +86,18 @@ def holding_force(plant: Plant, minv, a, sticking):
     matrix = jnp.where(both, compliance, jnp.eye(rows.shape[0]))
     matrix = jnp.where(jnp.diag(matrix)[:, None] > 0, matrix, jnp.eye(rows.shape[0]))
     matrix = matrix + _SHARED * jnp.diag(jnp.diag(matrix))
-    return jnp.linalg.solve(matrix, jnp.where(sticking, need, 0.0))
+    return _solved(matrix, jnp.where(sticking, need, 0.0))
+
+
+def _solved(matrix, right):
+    """Solution of a small positive definite system."""
+    # Eliminated here, without pivots: a call of a library would leave the compiled step.
+    for i in range(right.shape[0]):
+        row, value = matrix[i] / matrix[i, i], right[i] / matrix[i, i]
+        others = jnp.where(jnp.arange(right.shape[0]) == i, 0.0, matrix[:, i])
+        matrix = (matrix - others[:, None] * row[None, :]).at[i].set(row)
+        right = (right - others * value).at[i].set(value)
+    return right
 
 
 def acceleration(plant: Plant, minv, x, v, z, mode, g, t):

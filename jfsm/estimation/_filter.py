@@ -16,6 +16,7 @@ from jaxtyping import Array, Float
 
 from ..dynamics._forces import friction_limits, settle
 from ..dynamics._grid import Fine, advance_sample, begin, drive_before, load_of, punctual, remember, true_force
+from ..dynamics._kernel import one_kernel_scan
 from ..dynamics._plant import Plant, Readout
 from ..dynamics._stepper import (
     Load,
@@ -39,6 +40,8 @@ _BARELY = 1e-3
 """Standard deviations beyond zero that tell a direction, no more."""
 _SMALL = 8
 """Columns of a matrix up to which its product is written out."""
+_FEW = 4
+"""States up to which the loop over samples is one kernel: of more it takes minutes to compile."""
 
 
 class Readings(eqx.Module):
@@ -101,12 +104,14 @@ def innovations(
     noise: ProcessNoise,
     start: Start,
     log_scale,
+    *,
+    one_kernel: bool = False,
 ) -> Innovations:
     """Innovations of one filter run.
 
     `log_scale` (channels,) is the logarithm of the factor on each channel's noise variance. A sample with ``use = 0``
     is predicted, not used: a stretch of such samples is a free prediction with its own error bar. A delay reaches back
-    into the means of the filter.
+    into the means of the filter. Where not many run at once, `one_kernel` is faster.
     """
     minv = inverse_mass(plant)
     dof, dt = plant.dof, fine.step
@@ -143,7 +148,8 @@ def innovations(
     before = tuple(drive_before(fine, tau) for tau in plant.channel_delay)
     inputs = (fine.force, fine.base, fine.time, readings.values, readings.use, readings.valid, before)
     carry = (motion, past, start.covariance, jnp.full(len(rows), _FAR))
-    return jax.lax.scan(body, carry, inputs)[1]
+    loop = one_kernel_scan if one_kernel and size <= _FEW and plant.named else jax.lax.scan
+    return loop(body, carry, inputs)[1]
 
 
 def _transition(plant, minv, before: Motion, after: Motion, time, dt, substeps: int):

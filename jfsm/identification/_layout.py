@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..dynamics._plant import Channel, Plant, lower
+from ..dynamics._plant import Channel, Plant, numbers_of
 from ..structures import Structure
 
 _PARTS = (
@@ -57,10 +57,12 @@ def plant_rows(
 
     The plant is linear in each, so doubling a number shows it exactly.
     """
-    base, values = plant_vector(lower(structure, channels, **slots)), structure.values()
+    base, values = plant_vector(numbers_of(structure, channels, **slots)), structure.values()
     rows = []
     for path in paths:
         value = values[path]
         step = value if value != 0 else 1.0
-        rows.append((plant_vector(lower(structure.with_values({path: value + step}), channels, **slots)) - base) / step)
+        rows.append(
+            (plant_vector(numbers_of(structure.with_values({path: value + step}), channels, **slots)) - base) / step
+        )
     return np.array(rows).reshape(len(paths), base.size)

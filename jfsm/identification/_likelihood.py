@@ -22,6 +22,8 @@ from ..estimation._filter import Innovations, ProcessNoise, Readings, Start, inn
 from ..estimation._imposed import force_innovations
 from ._layout import with_vector
 
+_FEW = 32
+"""Unknowns up to which derivatives by all of them are taken in one kernel."""
 _BLOCKS = 64
 """Stretches of a record whose gradients count as independent of each other."""
 
@@ -47,7 +49,9 @@ def _run(
     if isinstance(fine, Imposed):
         return force_innovations(with_vector(plant, numbers), show, fine, readings, noise, doubt, tail[2 * dof :])
     start = Start(tail[:dof], tail[dof : 2 * dof], jnp.diag(doubt**2))
-    return innovations(with_vector(plant, numbers), show, fine, readings, noise, start, tail[2 * dof :])
+    few = theta.size <= _FEW
+    plant = with_vector(plant, numbers)
+    return innovations(plant, show, fine, readings, noise, start, tail[2 * dof :], one_kernel=few)
 
 
 def _each(one, plant: Plant, lanes: Lanes, theta):

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..dynamics._imposed import Imposed
-from ..dynamics._plant import Grid, Plant, hidden_width, lower
+from ..dynamics._plant import Grid, Plant, hidden_width, numbers_of
 from ..estimation._filter import Innovations, ProcessNoise
 from ..structures import AbstractFriction, ChannelDelay, ForceDelay, Structure
 from ._layout import plant_rows, plant_vector
@@ -185,17 +185,18 @@ class Posterior:
         width = next(w for w in _WIDTHS if w >= len(mine))
         grid = Grid(float(nuisances.record.dt), nuisances.fine.substeps)
         slots = {"smooth_slots": _slot_bucket(structures[0]), "grid": grid, "rolled": True}
-        plants = [lower(s, nuisances.channels, **slots) for s in structures]
+        plants = [numbers_of(s, nuisances.channels, **slots) for s in structures]
         packed = {}
         for lane in set(self._pick):
             mine_of = [self.hypothesis.unknowns[lane][k] for k in mine]
             structure = self.hypothesis.structures[lane]
-            packed[lane] = _lane(
-                structure, mine_of, nuisances, plant_vector(lower(structure, nuisances.channels, **slots)), width, slots
-            )
+            packed[lane] = _lane(structure, mine_of, nuisances, plant_vector(plants[lane]), width, slots)
         base, rows, unit, log = (jnp.asarray(np.stack([packed[lane][i] for lane in self._pick])) for i in range(4))
         stacked = jax.tree.map(
-            lambda *leaves: jnp.stack(leaves) if jnp.issubdtype(leaves[0].dtype, jnp.floating) else leaves[0], *plants
+            lambda *leaves: jnp.asarray(
+                np.stack(leaves) if jnp.issubdtype(leaves[0].dtype, jnp.floating) else leaves[0]
+            ),
+            *plants,
         )
         return stacked, Lanes(base, rows, unit, log), mine
 
@@ -244,7 +245,7 @@ def _doubt(plant: Plant, nuisances: Nuisances):
 
 def _slot_bucket(structure: Structure) -> int:
     """Smooth slots of the program: one for a candidate beside a linear model, then powers of two."""
-    plant = lower(structure)
+    plant = numbers_of(structure)
     count = len(plant.smooth)
     if count == 0 and (len(plant.friction) or len(plant.memory) or len(plant.delayed) or _is_late(structure)):
         return 0  # in a program of its own anyway

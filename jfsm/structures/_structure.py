@@ -213,13 +213,12 @@ class Structure(eqx.Module):
 
     def with_values(self, values: Mapping[str, float]) -> "Structure":
         """The same structure with other numbers, by path."""
-        unknown = [path for path in values if path not in self.entries()]
+        known = self.entries()
+        unknown = [path for path in values if path not in known]
         if unknown:
-            raise ValueError(
-                f"{unknown[0]!r} names no parameter of this structure; it has {', '.join(self.entries())}."
-            )
+            raise ValueError(f"{unknown[0]!r} names no parameter of this structure; it has {', '.join(known)}.")
         mass = np.array(self.mass)
-        paths = iter(self.entries())
+        paths = iter(known)
         for i in range(self.dof):
             value = values.get(next(paths))
             if value is not None:

@@ -1,0 +1,25 @@
+"""Loops over samples, which XLA's processor runtime would run operation by operation."""
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+from jax.experimental.xla_metadata import set_xla_metadata
+
+
+def one_kernel_scan(body: Callable[[Any, Any], tuple[Any, Any]], start: Any, inputs: Any) -> tuple[Any, Any]:
+    """`jax.lax.scan` for a body of very many operations on a few numbers each.
+
+    Most of the time of such a loop goes by between its operations. On a processor it is compiled to one kernel here:
+    three times faster, and on one core. A kernel calls no library, so that matrices must be small, too small for XLA to
+    have them multiplied by one, and nothing may be decomposed.
+    """
+
+    def loop(start, inputs):
+        return jax.lax.scan(body, start, inputs)
+
+    if jax.default_backend() != "cpu":
+        return loop(start, inputs)
+    # The attributes belong to the call, not to what is inside: a tagged result tags the operation that it comes from.
+    found: Any = set_xla_metadata(jax.jit(loop)(start, inputs), inlineable="false", xla_cpu_small_call="true")
+    return found
