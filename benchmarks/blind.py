@@ -3,7 +3,7 @@
     python benchmarks/blind.py --n 100 --seed 1 --jobs 2 --noise 0.001 0.01 --out results.jsonl
 
 One line of JSON per challenge is appended to the file as it is done; the same call goes on where it was stopped. With
-`--two`, two effects of different families are hidden at once.
+`--two`, two effects of different families are hidden at once; with `--outside`, one that no catalogue names.
 """
 
 import argparse
@@ -21,7 +21,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.blind_table import Row, exact, hidden, said, table  # noqa: E402  (needs the line above when run as a script)
-from tests.blind import CAUSES, PAIRS, Challenge, draw, draw_two  # noqa: E402
+from tests.blind import CAUSES, OUTSIDE, PAIRS, Challenge, draw, draw_two  # noqa: E402
 from tests.blind.challenge import CHANNEL_SETS, NOISE_LEVELS  # noqa: E402
 from tests.blind.drives import DRIVES  # noqa: E402
 
@@ -61,7 +61,9 @@ def drawn(seed: int, drawing: Drawing) -> Challenge:
 
 def question(challenge: Challenge) -> Row:
     """What was drawn, the truth included."""
-    beside = {"beside": dataclasses.asdict(challenge.beside)} if challenge.beside else {}
+    more: Row = {"beside": dataclasses.asdict(challenge.beside)} if challenge.beside else {}
+    if challenge.cause in OUTSIDE:
+        more["outside"] = True
     return {
         "seed": challenge.seed,
         "cause": challenge.cause,
@@ -74,7 +76,7 @@ def question(challenge: Challenge) -> Row:
         "share": challenge.share,
         "left": challenge.left,
         "damping_ratio": challenge.truth.damping_ratio,
-    } | beside
+    } | more
 
 
 def answer(diagnosis: Any) -> Row:
@@ -188,11 +190,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "--causes", nargs="+", default=list(CAUSES), choices=CAUSES, metavar="ID", help="any of the catalogue"
     )
     parser.add_argument("--two", action="store_true", help="hide two of the causes at once")
+    parser.add_argument("--outside", action="store_true", help="hide effects that are not in the catalogue instead")
     parser.add_argument("--channels", nargs="+", default=list(CHANNEL_SETS), choices=list(CHANNEL_SETS))
     parser.add_argument("--excitation", nargs="+", default=list(DRIVES), choices=list(DRIVES))
     parser.add_argument("--out", type=Path, help="file of JSON lines to append to and to resume from")
     given = parser.parse_args(arguments)
     drawing = {name: getattr(given, name) for name in ("causes", "noise", "channels", "excitation")}
+    if given.outside:
+        drawing["causes"] = list(OUTSIDE)
     if given.two:  # not said otherwise, so that files of one effect can be gone on with
         drawing["two"] = True
     rows = run(range(given.seed, given.seed + given.n), drawing, given.jobs, given.out, lambda s: print(s, flush=True))

@@ -60,9 +60,11 @@ def hidden(row: Row) -> str:
 
 
 def kind(row: Row) -> str:
-    """ "none", "parameters" (a wrong value of the model's own) or "cause"."""
+    """ "none", "parameters" (a wrong value of the model's own), "outside" (of the catalogue) or "cause"."""
     if row["cause"] == "none":
         return "none"
+    if row.get("outside"):
+        return "outside"
     return "parameters" if row["cause"].endswith("_value") else "cause"
 
 
@@ -83,7 +85,7 @@ def said(row: Row) -> str:
 
 
 def exact(row: Row) -> bool:
-    """Whether the verdict is right; for nothing wrong, an undecided verdict is no error.
+    """Whether the verdict is right; for nothing wrong, or nothing that has a name, an undecided verdict is no error.
 
     Of two hidden effects, both must be named, in any order, and nothing else.
     """
@@ -91,6 +93,8 @@ def exact(row: Row) -> bool:
         return row["verdict"] == "cause" and sorted(named(row)) == sorted(truth["cause"] for truth in truths(row))
     if kind(row) == "none":
         return row["verdict"] in ("consistent", "undecided")
+    if kind(row) == "outside":
+        return row["verdict"] in ("unnamed", "undecided")
     if kind(row) == "parameters":
         return row["verdict"] == "parameters" and row["cause"] in named(row)
     return row["verdict"] == "cause" and named(row)[:1] == [row["cause"]]
@@ -161,7 +165,9 @@ def _table_of_one(rows: Sequence[Row]) -> str:
     answered = [row for row in rows if row["error"] is None]
     failed = [row for row in rows if row["error"] is not None]
     causes = [row for row in rows if kind(row) == "cause"]
-    quiet = [row for row in rows if kind(row) != "cause"]
+    quiet = [row for row in rows if kind(row) in ("none", "parameters")]
+    outside = [row for row in rows if kind(row) == "outside"]
+    unnamed = [row for row in outside if row["verdict"] == "unnamed"]
     inside = [covered for row in answered for covered in covers(row).values()]
     closed = [row["closed"] for row in answered if kind(row) != "none" and row["closed"] is not None]
     sure = [row for row in answered if confident(row)]
@@ -172,6 +178,8 @@ def _table_of_one(rows: Sequence[Row]) -> str:
         f"wrong value named         {Share.of([row for row in rows if kind(row) == 'parameters'], exact)}",
         f"silent where no law is    {Share.of(quiet, silent)}",
         f"  with nothing wrong      {Share.of([row for row in quiet if kind(row) == 'none'], silent)}",
+        f"outside: none named       {Share.of(outside, exact)}",
+        f"  a map half closes it    {Share.of(unnamed, lambda row: (row['closed'] or 0.0) >= 0.5)}",
         f"intervals that cover      {Share(sum(inside), len(inside))}",
         f"right where p > {CONFIDENT}       {Share.of(sure, exact)}",
         f"closed share, median      {_median(closed)}",

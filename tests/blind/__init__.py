@@ -9,5 +9,6 @@ from .challenge import FIRST_CAUSES as FIRST_CAUSES
 from .challenge import Challenge as Challenge
 from .challenge import Effect as Effect
 from .challenge import draw as draw
+from .laws import OUTSIDE as OUTSIDE
 from .two import PAIRS as PAIRS
 from .two import draw_two as draw_two

@@ -10,7 +10,7 @@ from .arrays import FloatArray, rms
 from .beliefs import WRONG_VALUES, roughly_known, wrong_value
 from .drives import DRIVES, Drive
 from .exact import integrate
-from .laws import FIRST_LAWS, LAWS, Law, NoLaw, Scene
+from .laws import FIRST_LAWS, LAWS, OUTSIDE, Law, NoLaw, Scene
 from .plants import EscapeError, Motion, Plant, State
 from .sensors import DELAYS, FIRST_SENSORS, SENSORS, UNITS, Channels, Sensor, with_noise
 from .sketch import sketch
@@ -108,7 +108,7 @@ def draw(
     Parameters
     ----------
     seed : int
-    causes : of `CAUSES`; one is drawn among those that the channel sets and excitations can tell
+    causes : of `CAUSES`, or of `OUTSIDE`; one is drawn among those that the channel sets and excitations can tell
     noise : share of each channel's rms; one is drawn
     channels : of "xva", "x", "a"; one is drawn
     excitation : of `DRIVES`; one is drawn, of all by default
@@ -119,7 +119,7 @@ def draw(
         If a name is unknown, or if no cause asked for can be told from the records asked for.
     """
     choice, physics, static = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3))
-    wanted = {cause: (cause,) for cause in named("causes", causes, CAUSES)}
+    wanted = {cause: (cause,) for cause in named("causes", causes, (*CAUSES, *OUTSIDE))}
     cause, channel_set, excitation = drawn_setting(choice, "causes", wanted, channels, excitation)
     level = float(choice.choice(np.atleast_1d(noise)))
 
@@ -275,13 +275,13 @@ def _fair_question(rng: np.random.Generator, cause: str, excitation: str) -> tup
         plant, time = draw_plant(rng)
         drive, start, plain = draw_motion(rng, plant, excitation, time)
         scale, limit = rms(plain.x), FARTHEST * plain.peak
-        if cause not in LAWS:
+        if cause not in LAWS and cause not in OUTSIDE:
             return plant, drive, start, NoLaw(), integrate(plant, NoLaw(), drive, start, time, scale)
         if cause in NEEDS_REST:
             start = (0.0, 0.0)
         for _ in range(20):
             try:
-                law = _sized(rng, LAWS[cause], Scene(plant, drive, plain), start, limit)
+                law = _sized(rng, (LAWS | OUTSIDE)[cause], Scene(plant, drive, plain), start, limit)
                 begin = law.start(*start, plant.stiffness)
                 motion = trusted_motion(plant, law, drive, begin, time, scale, limit)
             except EscapeError:

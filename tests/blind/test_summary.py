@@ -23,6 +23,8 @@ from benchmarks.blind_table import (
     wrong,
 )
 
+from . import OUTSIDE
+
 
 def finding(
     cause: str, probability: float = 0.99, rivals: tuple[str, ...] = (), **intervals: tuple[float, float]
@@ -162,6 +164,16 @@ def test_the_table_counts_each_row_where_it_belongs():
     assert sure.count("seed") == 3
 
 
+def test_of_an_effect_outside_the_catalogue_no_name_is_the_right_answer():
+    outside = {"outside": True, "closed": 0.4}
+    rows = [row("whirl", verdict, **outside) for verdict in ("unnamed", "undecided", "consistent")]
+    rows += [row("whirl", "unnamed", outside=True, closed=0.6), row("whirl", "cause", finding("coulomb"), **outside)]
+    assert [exact(r) for r in rows] == [True, True, False, True, False]
+    lines = [" ".join(line.split("(")[0].split()) for line in table(rows).splitlines()]
+    assert "outside: none named 3 of 5 = 60%" in lines and "a map half closes it 1 of 2 = 50%" in lines
+    assert "cause named exactly none drawn" in lines
+
+
 def test_a_table_of_nothing_but_failures_still_prints():
     assert "seconds, median none" in " ".join(table([FAILED]).split())
 
@@ -269,6 +281,8 @@ def test_only_a_call_for_two_effects_draws_them(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(blind, "run", lambda seeds, drawing, *others: drawings.append(drawing) or [])
     blind.main(["--causes", "coulomb", "maxwell"])
     blind.main(["--causes", "coulomb", "maxwell", "--two"])
+    blind.main(["--outside"])
+    assert drawings.pop()["causes"] == list(OUTSIDE)
     assert "two" not in drawings[0] and drawings[1] == drawings[0] | {"two": True}
 
 

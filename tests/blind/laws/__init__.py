@@ -18,6 +18,16 @@ from .damping import (
 )
 from .input import PeriodicDisturbance, Preload
 from .memory import AttachedOscillator, BoucWen, DelayedForce, FreePlay, Jenkins, LuGre, Maxwell
+from .outside import (
+    Bump,
+    FadingFriction,
+    HalfDamping,
+    SlantedDamping,
+    SpeedStiffness,
+    WavyDamping,
+    WedgeFriction,
+    Whirl,
+)
 from .stiffness import (
     BilinearStiffness,
     CubicHardening,
@@ -46,5 +56,13 @@ LAWS: dict[str, type[Law]] = FIRST_LAWS | {
         *(BoucWen, Jenkins, LuGre, FreePlay, Maxwell, AttachedOscillator, DelayedForce),
         *(StiffnessDrift, StiffnessDrop, DampingDrift, ParametricStiffness),
         *(Preload, PeriodicDisturbance),
+    )
+}
+# None of these is in the catalogue, nor near a law that is.
+OUTSIDE: dict[str, type[Law]] = {
+    law.cause: law
+    for law in (
+        *(SpeedStiffness, FadingFriction, Bump, WedgeFriction),
+        *(WavyDamping, HalfDamping, Whirl, SlantedDamping),
     )
 }
