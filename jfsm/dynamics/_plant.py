@@ -131,11 +131,11 @@ class Plant(eqx.Module):
         return self.mass.shape[0]
 
     @property
-    def named(self) -> bool:
-        """Whether all its laws are the library's own: no maps, and none that users wrote."""
-        slots = (self.smooth, self.friction, self.memory, self.delayed)
-        tables = (SMOOTH_TERMS, FRICTION_TERMS, MEMORY_TERMS, DELAYED_TERMS)
-        return not self.maps and all(s.laws == table for s, table in zip(slots, tables, strict=True))
+    def elementary(self) -> bool:
+        """Whether sums, products and functions are all it asks for: no look at the past, no maps, no users' laws."""
+        tables = (SMOOTH_TERMS, FRICTION_TERMS, MEMORY_TERMS)
+        known = all(s.laws == table for s, table in zip((self.smooth, self.friction, self.memory), tables, strict=True))
+        return known and not self.maps and not len(self.delayed)
 
     @property
     def hidden(self) -> int:

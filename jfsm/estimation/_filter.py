@@ -148,7 +148,7 @@ def innovations(
     before = tuple(drive_before(fine, tau) for tau in plant.channel_delay)
     inputs = (fine.force, fine.base, fine.time, readings.values, readings.use, readings.valid, before)
     carry = (motion, past, start.covariance, jnp.full(len(rows), _FAR))
-    loop = one_kernel_scan if one_kernel and size <= _FEW and plant.named else jax.lax.scan
+    loop = one_kernel_scan if one_kernel and size <= _FEW and plant.elementary else jax.lax.scan
     return loop(body, carry, inputs)[1]
 
 
