@@ -13,7 +13,7 @@ import jfsm
 from jfsm.dynamics._excitation import excitation
 from jfsm.dynamics._plant import lower, readout
 from jfsm.estimation import Innovations, ProcessNoise, Readings, Start, innovations
-from jfsm.structures import AccelerationGain, ForceGain, Offset
+from jfsm.structures import AccelerationGain, Coulomb, CubicStiffness, DelayedForce, ForceGain, Maxwell, Offset
 
 N, DT, PADDED = 60, 0.02, 64
 TIME = DT * np.arange(N)
@@ -38,7 +38,9 @@ def measured() -> tuple[np.ndarray, np.ndarray]:
     return force, 0.1 * rng.standard_normal((N, len(CHANNELS))) + np.array([0.5, 0.2, 1.0])
 
 
-def filtered(model=MODEL, values=None, use=None, length: int = PADDED) -> Innovations:
+def filtered(
+    model=MODEL, values=None, use=None, length: int = PADDED, x0=X0, covariance=START_COVARIANCE, one_kernel=False
+) -> Innovations:
     force, readings = measured()
     readings = readings if values is None else values
     use = np.ones_like(readings) if use is None else use
@@ -55,8 +57,9 @@ def filtered(model=MODEL, values=None, use=None, length: int = PADDED) -> Innova
             jnp.asarray(np.arange(length) < N, dtype=jnp.float64),
         ),
         ProcessNoise(jnp.asarray(PROCESS)),
-        Start(jnp.asarray(X0), jnp.asarray(V0), jnp.asarray(START_COVARIANCE)),
+        Start(jnp.asarray(x0), jnp.asarray(V0), jnp.asarray(covariance)),
         jnp.asarray(LOG_SCALE),
+        one_kernel=one_kernel,
     )
 
 
@@ -93,6 +96,30 @@ def dense_law() -> tuple[np.ndarray, np.ndarray]:
     mean = np.array(means) @ rows.T + force @ through.T + np.array([0.3, 0.0, 0.0])
     spread = np.einsum("ci,kilj,dj->kcld", rows, covariance, rows).reshape(N * 3, N * 3)
     return mean.ravel(), spread + np.diag(np.tile(VARIANCE * np.exp(LOG_SCALE), N))
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        CubicStiffness(3.0, at=(1, 2)),
+        Coulomb(0.3, at=(0, 1)),
+        DelayedForce(1.0, 0.05, at=(0, 1)),
+        Maxwell(2.0, 0.3, at=(0, 1)),
+    ],
+    ids=lambda law: law.kind,
+)
+def test_one_kernel_gives_what_the_ordinary_loop_gives_with_its_derivatives(law):
+    """Also where it must not be one: a look at the past, more states than four."""
+
+    def found(one_kernel):
+        def run(x0):
+            covariance = np.diag([*np.diag(START_COVARIANCE), 0.01, 0.01][: 4 + 2 * bool(law.states)])
+            return filtered(MODEL + law, x0=x0, covariance=covariance, one_kernel=one_kernel)
+
+        return jax.jvp(run, (jnp.asarray(X0),), (jnp.array([1.0, -0.5]),))
+
+    for one, other in zip(jax.tree.leaves(found(True)), jax.tree.leaves(found(False)), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * max(1.0, np.abs(other).max()))
 
 
 RUN = eqx.filter_jit(innovations)
