@@ -1,10 +1,39 @@
 """Loops over samples, which XLA's processor runtime would run operation by operation."""
 
 from collections.abc import Callable
-from typing import Any
+from functools import wraps
+from typing import Any, TypeVar
 
+import equinox as eqx
 import jax
 from jax.experimental.xla_metadata import set_xla_metadata
+
+Found = TypeVar("Found")
+
+_refused = False
+"""Whether this process has met a program that XLA does not make one kernel of."""
+
+
+def jit_with_kernels(function: Callable[..., Found]) -> Callable[..., Found]:
+    """`eqx.filter_jit` of a function whose keyword `one_kernel` says whether its loops may be kernels.
+
+    Which operations a kernel may hold differs between versions of XLA: after a first refusal there are no more kernels.
+    """
+    compiled = eqx.filter_jit(function)
+
+    @wraps(function)
+    def run(*arguments: Any) -> Found:
+        global _refused
+        if not _refused:
+            try:
+                return compiled(*arguments, one_kernel=True)
+            except jax.errors.JaxRuntimeError:
+                found = compiled(*arguments, one_kernel=False)  # raises again what is no refusal
+                _refused = True
+                return found
+        return compiled(*arguments, one_kernel=False)
+
+    return run
 
 
 def one_kernel_scan(body: Callable[[Any, Any], tuple[Any, Any]], start: Any, inputs: Any) -> tuple[Any, Any]:

@@ -17,6 +17,7 @@ from jaxtyping import Array, Float
 
 from ..dynamics._grid import Fine
 from ..dynamics._imposed import Imposed
+from ..dynamics._kernel import jit_with_kernels
 from ..dynamics._plant import Plant, Readout
 from ..estimation._filter import Innovations, ProcessNoise, Readings, Start, innovations
 from ..estimation._imposed import force_innovations
@@ -38,7 +39,15 @@ class Lanes(eqx.Module):
 
 
 def _run(
-    plant: Plant, lane, theta, show: Readout, fine: Fine | Imposed, readings: Readings, noise: ProcessNoise, doubt
+    plant: Plant,
+    lane,
+    theta,
+    show: Readout,
+    fine: Fine | Imposed,
+    readings: Readings,
+    noise: ProcessNoise,
+    doubt,
+    one_kernel: bool,
 ) -> Innovations:
     """Innovations of one start: of a filter that a force drives, or of the force readings along an imposed motion."""
     base, rows, unit, log = lane
@@ -49,9 +58,8 @@ def _run(
     if isinstance(fine, Imposed):
         return force_innovations(with_vector(plant, numbers), show, fine, readings, noise, doubt, tail[2 * dof :])
     start = Start(tail[:dof], tail[dof : 2 * dof], jnp.diag(doubt**2))
-    few = theta.size <= _FEW
     plant = with_vector(plant, numbers)
-    return innovations(plant, show, fine, readings, noise, start, tail[2 * dof :], one_kernel=few)
+    return innovations(plant, show, fine, readings, noise, start, tail[2 * dof :], one_kernel=one_kernel)
 
 
 def _each(one, plant: Plant, lanes: Lanes, theta):
@@ -66,8 +74,8 @@ def _each(one, plant: Plant, lanes: Lanes, theta):
     return jax.tree.map(lambda found: found[None], one(alone, *(leaf[0] for leaf in mapped)))
 
 
-@eqx.filter_jit
-def derivatives(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, doubt, until):
+@jit_with_kernels
+def derivatives(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, doubt, until, *, one_kernel: bool):
     """Minus log-likelihood (lanes,), its gradient (lanes, unknowns), and two matrices (lanes, unknowns, unknowns): the
     information, and the sum of outer products of the gradients of `_BLOCKS` stretches of the record.
 
@@ -75,9 +83,11 @@ def derivatives(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, 
     """
     counted = readings.use * (jnp.arange(readings.valid.size) < until)[:, None] * readings.valid[:, None]
 
+    few = one_kernel and theta.shape[1] <= _FEW
+
     def one(plant, base, rows, unit, log, theta):
         def outcome(theta):
-            found = _run(plant, (base, rows, unit, log), theta, show, fine, readings, noise, doubt)
+            found = _run(plant, (base, rows, unit, log), theta, show, fine, readings, noise, doubt, few)
             return found.error, jnp.log(found.variance), found.log_share
 
         push = partial(jax.jvp, outcome, (theta,))
@@ -98,11 +108,15 @@ def derivatives(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, 
     return _each(one, plant, lanes, theta)
 
 
-@eqx.filter_jit
-def predictions(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, doubt) -> Innovations:
+@jit_with_kernels
+def predictions(
+    plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, doubt, *, one_kernel: bool
+) -> Innovations:
     """Innovations (lanes, n, channels) of every lane."""
 
+    few = one_kernel and theta.shape[1] <= _FEW
+
     def one(plant, base, rows, unit, log, theta):
-        return _run(plant, (base, rows, unit, log), theta, show, fine, readings, noise, doubt)
+        return _run(plant, (base, rows, unit, log), theta, show, fine, readings, noise, doubt, few)
 
     return _each(one, plant, lanes, theta)
