@@ -2,7 +2,8 @@
 
 A cause must do three things: be more probable than its absence, explain at least half of the power that a refit of the
 model leaves, and do so on every set of samples, held-out ones included. Where the winner leaves nothing but noise, its
-evidence is trusted as it stands; where it does not, evidence counts no more than some tens of independent looks.
+evidence is trusted as it stands; where it does not, evidence counts no more than some tens of independent looks, and
+no cause is more probable than the share of the power that it explains.
 """
 
 import math
@@ -138,6 +139,9 @@ def decide(
     if verdict == "cause" and chance[id(winner)] < 0.5:
         if sum(chance[id(t)] for t in passing if families(t) == families(winner)) < 0.8:
             verdict = "undecided"
+    if verdict == "cause" and not adequate(winner):
+        # The rest may be the work of another law than the catalogue's: no name is surer than what it explains.
+        chance = {which: p * min(explained(winner, refitted), 1.0) for which, p in chance.items()}
     if verdict == "consistent":
         winner = given
     elif verdict == "unnamed" and mapped is not None:

@@ -1,0 +1,50 @@
+"""The verdict over trials that are made up."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import jfsm
+from jfsm.diagnosis._decide import decide
+from jfsm.diagnosis._effect import Effect
+from jfsm.diagnosis._trial import Prediction
+
+NOISE = 1e-4
+
+
+def trial(evidence: float, power: float, *causes: str) -> Any:
+    """A hypothesis that leaves so much power beyond noise on the fitted samples and on the others."""
+    error = np.full(2, power + NOISE)
+    return SimpleNamespace(
+        evidence=evidence,
+        prediction=Prediction(error, np.full(2, NOISE), np.full(2, NOISE / 10)),
+        effects=tuple(Effect(jfsm.structures.causes()[cause], (0, 1)) for cause in causes),
+        laws=(),
+        unknowns=(),
+        structure=SimpleNamespace(terms=()),
+        whiteness=0.0 if power == 0 else 0.4,
+        noise=np.zeros(1),
+        trusted=np.ones(1, bool),
+    )
+
+
+GIVEN, REFITTED = trial(0.0, 0.5), trial(1000.0, 0.1)
+
+
+def shares(*tried: Any) -> list[float]:
+    decision = decide(GIVEN, REFITTED, tried, lambda t: None, periods=100.0)
+    assert decision.verdict == "cause" and decision.winner is tried[0]
+    return [decision.share(t) for t in tried]
+
+
+@pytest.mark.parametrize("left", [0.002, 0.01, 0.015])
+def test_a_cause_that_leaves_something_is_no_surer_than_the_share_that_it_explains(left: float):
+    found, rival = shares(trial(9000.0, left, "coulomb"), trial(8000.0, 0.04, "quadratic_damping"))
+    assert 0.9 * (1 - left / 0.1) < found <= 1 - left / 0.1 and rival < 0.1
+
+
+def test_a_cause_that_leaves_nothing_is_as_sure_as_its_evidence():
+    found, rival = shares(trial(9000.0, 0.0, "coulomb"), trial(8000.0, 0.04, "quadratic_damping"))
+    assert found > 0.995 and rival < 0.005
