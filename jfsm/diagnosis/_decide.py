@@ -141,7 +141,7 @@ def decide(
             verdict = "undecided"
     if verdict == "cause" and not adequate(winner):
         # The rest may be the work of another law than the catalogue's: no name is surer than what it explains.
-        chance = {which: p * min(explained(winner, refitted), 1.0) for which, p in chance.items()}
+        chance = {which: p * kappa[id(winner)] for which, p in chance.items()}
     if verdict == "consistent":
         winner = given
     elif verdict == "unnamed" and mapped is not None:

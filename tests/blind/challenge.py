@@ -271,17 +271,18 @@ def can_tell(cause: str, channel_set: str, excitation: str) -> bool:
 
 def _fair_question(rng: np.random.Generator, cause: str, excitation: str) -> tuple[Plant, Drive, State, Law, Motion]:
     """A plant under a drive with a law whose effect is of the wanted size, redrawn until it is."""
+    kind = (LAWS | OUTSIDE).get(cause)
     for _ in range(50):
         plant, time = draw_plant(rng)
         drive, start, plain = draw_motion(rng, plant, excitation, time)
         scale, limit = rms(plain.x), FARTHEST * plain.peak
-        if cause not in LAWS and cause not in OUTSIDE:
+        if kind is None:
             return plant, drive, start, NoLaw(), integrate(plant, NoLaw(), drive, start, time, scale)
         if cause in NEEDS_REST:
             start = (0.0, 0.0)
         for _ in range(20):
             try:
-                law = _sized(rng, (LAWS | OUTSIDE)[cause], Scene(plant, drive, plain), start, limit)
+                law = _sized(rng, kind, Scene(plant, drive, plain), start, limit)
                 begin = law.start(*start, plant.stiffness)
                 motion = trusted_motion(plant, law, drive, begin, time, scale, limit)
             except EscapeError:

@@ -7,13 +7,14 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..arrays import rms
-from .base import Hidden, KinkedLaw, Law, Mode, Scene, either_sign
+from .base import Hidden, KinkedLaw, Mode, Scene, either_sign
 
 
 @dataclasses.dataclass(frozen=True)
-class Outside(Law):
+class Outside(KinkedLaw):
     """F times a shape of x / x_0 and v / v_0, the rms of the motion it was made for; F of any unit of force [N]."""
 
+    smooth: ClassVar[bool] = True  # but where it has kinks
     F: float
     x0: float
     v0: float
@@ -29,15 +30,10 @@ class Outside(Law):
         return 1.0
 
     @classmethod
-    def signs(cls, x: Any, v: Any) -> Mode:
-        """Signs of its kinks along a motion."""
-        return ()
-
-    @classmethod
     def draw(cls, rng: np.random.Generator, scene: Scene, rms_force: float) -> Self:
-        x, v = scene.motion.x / scene.x_rms, scene.motion.v / scene.v_rms
-        size = rms_force / rms(cls.shape(x, v, cls.signs(x, v)))
-        return cls(cls.sign(rng) * size, scene.x_rms, scene.v_rms)
+        unit, x, v = cls(1.0, scene.x_rms, scene.v_rms), scene.motion.x, scene.motion.v
+        mode = tuple(np.sign(y) for y in unit.velocity_kinks(x, v, ()) + unit.displacement_kinks(x, v, ()))
+        return unit.scaled(cls.sign(rng) * rms_force / rms(unit.force(x, v, (), 0.0, 0.0, mode)))
 
     def scaled(self, factor: float) -> Self:
         return dataclasses.replace(self, F=factor * self.F)
@@ -47,14 +43,11 @@ class Outside(Law):
 
 
 @dataclasses.dataclass(frozen=True)
-class SpeedStiffness(KinkedLaw, Outside):
+class SpeedStiffness(Outside):
     """x abs(v): a spring that stiffens with speed."""
 
     cause: ClassVar[str] = "speed_stiffness"
-
-    @classmethod
-    def signs(cls, x: Any, v: Any) -> Mode:
-        return (np.sign(v),)
+    smooth: ClassVar[bool] = False
 
     def velocity_kinks(self, x: Any, v: Any, z: Hidden) -> tuple[Any, ...]:
         return (v,)
@@ -113,14 +106,11 @@ class WavyDamping(Outside):
 
 
 @dataclasses.dataclass(frozen=True)
-class HalfDamping(KinkedLaw, Outside):
+class HalfDamping(Outside):
     """v max(x, 0): a damper that acts on one side of the middle."""
 
     cause: ClassVar[str] = "half_damping"
-
-    @classmethod
-    def signs(cls, x: Any, v: Any) -> Mode:
-        return (np.sign(x),)
+    smooth: ClassVar[bool] = False
 
     def displacement_kinks(self, x: Any, v: Any, z: Hidden) -> tuple[Any, ...]:
         return (x,)
