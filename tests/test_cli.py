@@ -403,12 +403,13 @@ def test_a_name_that_cannot_be_fixed_is_refused(channels, folder, tmp_path):
 
 
 def test_a_model_that_is_right_and_one_that_is_too_stiff_are_told_apart(channels, folder, tmp_path):
-    right = run("diagnose", *channels, "--at-rest", "--model", folder / "model.toml", "--key", 1)
+    few = [word for cause in ("cubic_hardening", "coulomb", "force_gain") for word in ("--cause", cause)]
+    right = run("diagnose", *channels, "--at-rest", "--model", folder / "model.toml", "--key", 1, *few)
     assert (right.exit_code, right.stderr) == (0, ""), right.output
     page, numbers, mended = (tmp_path / name for name in ("page.html", "d.json", "mended.toml"))
     page.write_text("of yesterday")
     outputs = ["--report", page, "--json", numbers, "--extended", mended]
-    wrong = run("diagnose", *channels, "--at-rest", "--model", folder / "stiff.toml", "--key", 1, *outputs)
+    wrong = run("diagnose", *channels, "--at-rest", "--model", folder / "stiff.toml", "--key", 1, *few, *outputs)
     assert (wrong.exit_code, wrong.stderr) == (1, ""), wrong.output
     assert json.loads(numbers.read_text(encoding="utf-8"))["verdict"] == "parameters"
     assert page.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")

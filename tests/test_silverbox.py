@@ -6,6 +6,8 @@ import pytest
 
 import jfsm
 
+CAUSES = ("cubic_hardening", "cubic_softening", "quadratic_stiffness", "quadratic_damping", "coulomb", "force_gain")
+
 
 def test_a_cubic_spring_is_named_on_the_measured_circuit(shared_data):
     record = jfsm.read(
@@ -18,7 +20,7 @@ def test_a_cubic_spring_is_named_on_the_measured_circuit(shared_data):
     omega = 2 * np.pi * 68.6
     model = jfsm.Structure.sdof(mass=1 / omega**2, stiffness=1.0, damping=2 * 0.047 / omega)
     test = record[66_000:69_000]
-    d = jfsm.diagnose(record[:3000], model, holdout=test, key=jax.random.key(0))
+    d = jfsm.diagnose(record[:3000], model, holdout=test, causes=CAUSES, key=jax.random.key(0))
     assert d.verdict == "cause"
     (finding,) = d.findings
     assert finding.cause == "cubic_hardening"

@@ -91,17 +91,14 @@ def diagnose(
     records = prepare_all(whole, model, reconstruction)
     every = candidates(model, records, chosen, places)
     tried, left_out = promising(every)
-    steps = _Steps(progress, 4)
+    steps = _Steps(progress, 3)
 
-    steps.next("the model as given")
-    given = fit_model("given", model, records, until, refit=False)
-    steps.next("the model refitted")
-    refitted = fit_model("refitted", model, records, until, refit=True)
+    steps.next("the model as given and refitted")
+    given, refitted = fit_model(model, records, until)
     if _outweighed(model, refitted.structure):
         # The noise of the force acts through the mass, and all hypotheses share one noise: that of the likelier mass.
         records = prepare_all(whole, model, reconstruction, weighed=refitted.structure)
-        given = fit_model("given", model, records, until, refit=False)
-        refitted = fit_model("refitted", model, records, until, refit=True)
+        given, refitted = fit_model(model, records, until, near=refitted.structure)
     imposed = records[0].path is not None
     trials, behind = search(tried, model, given, refitted, records, until, steps.next)
     if max_causes > 1:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .._threads import compiled_once, side_by_side
-from ..identification import LANES, Maximum, Nuisances, Posterior, approach, finish, lanes_of, rungs
+from ..identification import LADDER, LANES, Maximum, Nuisances, Posterior, approach, finish, lanes_of, rungs
 from ..structures import Structure
 from ._candidates import Candidate, hypothesis
 from ._decide import GATE, explained
@@ -20,6 +20,8 @@ _FAR_BEHIND = 200.0
 """Nats behind the leader, one per cent of unmodelled force forgiven, from which a candidate is not pursued,"""
 _ALWAYS_PURSUED = 4
 """unless it is among the best of them."""
+_FIRST = 2
+"""Leaders whose tops are known before the others go on."""
 _PROMISING = 4
 """Laws that explain most of the missing force: no early rung ends them, nor causes of which it tells nothing. What they
 are worth, a few steps may not show."""
@@ -100,19 +102,35 @@ class _Lot:
             yield trial(self.posterior, found, lane, float(self.rung.value[lane]), effects=one.effects)
 
 
-def fit_model(name: str, model: Structure, records: Sequence[Nuisances], until: Sequence[int], *, refit: bool) -> Trial:
-    """The model as given, or with its own values refitted, the better of two climbs.
+def fit_model(
+    model: Structure, records: Sequence[Nuisances], until: Sequence[int], near: Structure | None = None
+) -> tuple[Trial, Trial]:
+    """The model as given, and with its own values refitted, each the better of two climbs.
 
     One comes down the ladder, for values that are far off; one begins at the values as given, for a model that lacks
-    something, whose top rungs lead astray.
+    something, whose top rungs lead astray. Of values refitted before, `near` tells them.
     """
+    own = None if near is None else {path: near.values()[path] for path in model.entries()}
     both = min(2, lanes_of(model))
-    posterior = Posterior(hypothesis(model, [model] * both, records, refit=refit), records, until)
-    rung = approach(posterior)
-    theta = np.vstack([rung.theta[:1], posterior.initial()[1:]])
-    found = finish(posterior, replace(rung, theta=theta))
-    best = int(np.argmin(found.value))
-    return trial(posterior, found, best, float(rung.value[0]), name)
+    ladder = LADDER if near is None else LADDER[-1:]
+
+    def climb(posterior: Posterior) -> tuple[Maximum, float]:
+        rung = approach(posterior, ladder)
+        theta = np.vstack([rung.theta[:1], posterior.initial()[1:]])
+        return finish(posterior, replace(rung, theta=theta)), float(rung.value[0])
+
+    posteriors = [
+        Posterior(hypothesis(model, [model] * both, records, refit=refit, begins=[own] * both), records, until)
+        for refit in (False, True)
+    ]
+    posteriors[0].evaluate(posteriors[0].initial())  # compiled once, before both ask for it
+    given, refitted = (
+        trial(posterior, found, int(np.argmin(found.value)), rung, name)
+        for name, posterior, (found, rung) in zip(
+            ("given", "refitted"), posteriors, side_by_side(climb, posteriors), strict=True
+        )
+    )
+    return given, refitted
 
 
 def groups(tried: Sequence[Candidate], own: Mapping[str, float] | None) -> list[list[Beginning]]:
@@ -197,10 +215,10 @@ def _climbed(
     def finished(lot: _Lot) -> list[Trial]:
         return list(lot.trials(finish(lot.posterior, lot.rung, best=leader)))
 
-    # The leader goes first: beside its top the others may be left where they are.
+    # The leaders go first: beside their tops the others may be left where they are.
     trials, leader = [], best.value
     ranked = sorted(pursued, key=lambda lot: lot.behind)
-    for together in (ranked[:1], ranked[1:]):
+    for together in (ranked[:_FIRST], ranked[_FIRST:]):
         for found in side_by_side(finished, together):
             tell("the best candidates", 2 * len(lots))
             trials += found

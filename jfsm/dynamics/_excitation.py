@@ -12,8 +12,8 @@ from ..structures import Clipping, LinearDamping, LinearStiffness, Structure
 from ._drive import Reconstruction, reconstruct
 from ._forces import hidden_start
 from ._grid import Fine
-from ._plant import Plant, lower
-from ._stepper import inverse_mass, jacobian
+from ._plant import Plant, numbers_of
+from ._stepper import inverse_mass, linearised
 
 _STEP_ANGLE = 0.22
 """Largest angle of the fastest mode per step [rad]: Runge-Kutta of order four then shifts a frequency by 2e-5."""
@@ -56,9 +56,9 @@ def substeps_for(structure: Structure, dt: float, speed: float = 0.0) -> int:
     ValueError
         If the largest number of steps would still be unstable, which would pass for a motion that runs away.
     """
-    plant, zero = lower(structure), np.zeros(structure.dof)
+    plant, zero = numbers_of(structure), np.zeros(structure.dof)
     linear = [term for term in structure.terms if isinstance(term, LinearStiffness | LinearDamping)]
-    fastest = _fastest_rate(lower(Structure(structure.mass, linear)), zero)
+    fastest = _fastest_rate(numbers_of(Structure(structure.mass, linear)), zero)
     if fastest * dt / _MOST_SUBSTEPS > _STABLE_ANGLE:
         raise ValueError(
             f"`model` must move slowly enough for the record's steps of {dt:.6g} s; its fastest mode or decay has "
@@ -78,13 +78,13 @@ def substeps_for(structure: Structure, dt: float, speed: float = 0.0) -> int:
 def _fastest_rate(plant: Plant, v: np.ndarray) -> float:
     """Largest eigenvalue [rad/s] of a plant's motion about x = 0 at velocity `v`; friction that sticks is left out."""
     dof = plant.dof
-    return float(np.max(np.abs(np.linalg.eigvals(np.asarray(relaxed_jacobian(plant, jnp.zeros(dof), jnp.asarray(v)))))))
+    return float(np.max(np.abs(np.linalg.eigvals(np.asarray(relaxed_jacobian(plant, np.zeros(dof), v))))))
 
 
 @eqx.filter_jit
 def relaxed_jacobian(plant: Plant, x, v):
     """Derivative of the rate of the state by the state, hidden states relaxed and friction left out."""
-    return jacobian(plant, inverse_mass(plant), x, v, hidden_start(plant, x, v), jnp.zeros(()))
+    return linearised(plant, inverse_mass(plant), x, v, hidden_start(plant, x, v), jnp.zeros_like(x), jnp.zeros(()))[1]
 
 
 def typical_speed(record: Record) -> float:

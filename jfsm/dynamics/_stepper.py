@@ -61,18 +61,19 @@ def free_acceleration(plant: Plant, minv, x, v, z, g, t):
     return times(minv, g - smooth_force(plant, x, v, z, t))
 
 
-def jacobian(plant: Plant, minv, x, v, z, t) -> Float[Array, "state state"]:
-    """Derivative of the rate of (x, v, z) by (x, v, z), friction left out and the base at rest."""
-    dof, none = plant.dof, jnp.zeros(plant.dof)
+def linearised(plant: Plant, minv, x, v, z, g, t) -> tuple[Float[Array, " dof"], Float[Array, "state state"]]:
+    """Acceleration without friction, and derivative of the rate of (x, v, z) by (x, v, z), the base at rest."""
+    dof = plant.dof
 
     def rate(state):
         x, v, z = state[:dof], state[dof : 2 * dof], state[2 * dof :]
-        a = free_acceleration(plant, minv, x, v, z, none, t)
+        a = free_acceleration(plant, minv, x, v, z, g, t)
         return jnp.concatenate([v, a, hidden_rate(plant, x, v, z, t, jnp.zeros(()))])
 
     state = jnp.concatenate([x, v, z])
-    push = jax.vmap(lambda e: jax.jvp(rate, (state,), (e,))[1])
-    return push(jnp.eye(state.size)).T
+    push = jax.vmap(lambda e: jax.jvp(rate, (state,), (e,)), out_axes=(None, 1))
+    rates, slopes = push(jnp.eye(state.size))
+    return rates[dof : 2 * dof], slopes
 
 
 def holding_force(plant: Plant, minv, a, sticking):
@@ -102,7 +103,11 @@ def _solved(matrix, right):
 
 def acceleration(plant: Plant, minv, x, v, z, mode, g, t):
     """Acceleration in the given mode, and the margin of each friction slot: negative once its mode has ended."""
-    a = free_acceleration(plant, minv, x, v, z, g, t)
+    return with_friction(plant, minv, x, v, mode, free_acceleration(plant, minv, x, v, z, g, t), t)
+
+
+def with_friction(plant: Plant, minv, x, v, mode, a, t):
+    """`acceleration`, from the one without friction."""
     if not len(plant.friction):
         return a, mode
     low, high = friction_limits(plant, x, v, t)

@@ -22,12 +22,12 @@ from ..dynamics._stepper import (
     Load,
     Motion,
     acceleration,
-    free_acceleration,
     holding_force,
     inverse_mass,
-    jacobian,
+    linearised,
     mode_at,
     stopping,
+    with_friction,
 )
 
 _NOTHING = 1e-6
@@ -137,9 +137,12 @@ def innovations(
         v = v - stopping(minv, rows, jnp.sum(rows * v[None, :], 1), still)
         motion = Motion(x, v, settle(plant, x, z), mode_at(plant, minv, x, v, z, g[0], time, still))
         after = advance_sample(plant, minv, motion, g, base, time, dt)
-        step = _transition(plant, minv, motion, after, time, dt, fine.substeps)
+        middle = jax.tree.map(lambda a, b: (a + b) / 2, motion[:3], after[:3])
+        free, rates = linearised(plant, minv, *middle, g[g.shape[0] // 2], time + dt / 2)
+        step = _transition(plant, minv, motion, after, rates, dt, fine.substeps)
         moving = _product(_product(step, updated), step.T) + added
-        overrun = _overrun(plant, minv, motion, after, moving, g[0], time, dt)
+        slope = with_friction(plant, minv, *middle[:2], motion.mode, free, time + dt / 2)[0]
+        overrun = _overrun(plant, motion, after, moving, slope, dt)
         keep = valid > 0
         onward = (after, remember(past, x, v), _rest(plant, minv, moving, after.mode), overrun)
         return jax.tree.map(lambda new, old: jnp.where(keep, new, old), onward, carry), found
@@ -152,14 +155,12 @@ def innovations(
     return loop(body, carry, inputs)[1]
 
 
-def _transition(plant, minv, before: Motion, after: Motion, time, dt, substeps: int):
-    """Derivative of the state after a sample by the state before it: exponential of the mid-point slope.
+def _transition(plant, minv, before: Motion, after: Motion, rates, dt, substeps: int):
+    """Derivative of the state after a sample by the state before it: exponential of the mid-point's `rates`.
 
     Its series is taken for a step as short as those of the mean, and squared back.
     """
     dof, hidden = plant.dof, plant.hidden
-    x, v, z = ((a + b) / 2 for a, b in zip(before[:3], after[:3], strict=True))
-    rates = jacobian(plant, minv, x, v, z, time + dt / 2)
     held = _held(plant, minv, rates[dof : 2 * dof], (before.mode == 0) & (after.mode == 0))
     halvings = (substeps - 1).bit_length()
     exponent = dt / 2**halvings * jnp.concatenate([rates[:dof], held, rates[2 * dof :]], 0)
@@ -193,14 +194,13 @@ def _rest(plant, minv, covariance, mode):
     return covariance
 
 
-def _overrun(plant, minv, before: Motion, after: Motion, covariance, g, time, dt):
+def _overrun(plant, before: Motion, after: Motion, covariance, slope, dt):
     """Speed with which every link that came to rest in a sample would have ended it unheld, in its standard deviations.
 
-    The closer to zero, the less certain it is that the link rests by then. All others are beyond doubt.
+    The closer to zero, the less certain it is that the link rests by then. All others are beyond doubt. `slope` is the
+    acceleration halfway.
     """
     rows, dof = plant.friction.direction, plant.dof
-    x, v, z = ((a + b) / 2 for a, b in zip(before[:3], after[:3], strict=True))
-    slope = acceleration(plant, minv, x, v, z, before.mode, g[g.shape[0] // 2], time + dt / 2)[0]
     speed = before.mode * jnp.sum(rows * (before.v + dt * slope)[None, :], 1)
     power = jnp.sum(rows[:, :, None] * covariance[None, dof : 2 * dof, dof : 2 * dof] * rows[:, None, :], (1, 2))
     stopped = (before.mode != 0) & (after.mode == 0) & (power > 0)
@@ -250,12 +250,15 @@ def _predict(plant, minv, show, c, mean, covariance, mode, overrun, load: Load, 
         return jnp.sum(select * mean[:dof]), jnp.concatenate([select, none, hidden]), certain
     if show.kinds[c] == "velocity":
         return jnp.sum(select * mean[dof : 2 * dof]), jnp.concatenate([none, select, hidden]), certain
+    x, v, z = mean[:dof], mean[dof : 2 * dof], mean[2 * dof :]
+    without = linearised(plant, minv, x, v, z, load.force[0], load.time)
     if len(plant.friction) == 1:
         a, by_state, log_share = _most_probable_mode(
-            plant, minv, select, c, mean, covariance, mode[0], overrun[0], load, y, use, variance, gain, nothing[0]
-        )
+            plant, minv, select, c, mean, covariance, mode[0], overrun[0], load, without, y, use, variance, gain,
+            nothing[0],
+        )  # fmt: skip
     else:
-        (a, by_state), log_share = _acceleration_and_slope(plant, minv, mean, mode, load), certain
+        (a, by_state), log_share = _in_mode(plant, minv, mean, mode, load, *without), certain
     return jnp.sum(select * (a + load.base[0])), jnp.sum(select[:, None] * by_state, 0), log_share
 
 
@@ -278,11 +281,11 @@ def _late(plant, minv, show, tau, mean, mode, load: Load, force, base):
     return jax.vmap(lambda e: jax.jvp(readings, (mean,), (e,)), out_axes=(None, 1))(jnp.eye(mean.size))
 
 
-def _acceleration_and_slope(plant, minv, mean, mode, load: Load):
+def _in_mode(plant, minv, mean, mode, load: Load, free, rates):
+    """Acceleration in a mode, and its derivative by the state, from those without friction."""
     dof = plant.dof
-    x, v, z = mean[:dof], mean[dof : 2 * dof], mean[2 * dof :]
-    a = acceleration(plant, minv, x, v, z, mode, load.force[0], load.time)[0]
-    return a, _held(plant, minv, jacobian(plant, minv, x, v, z, load.time)[dof : 2 * dof], mode == 0)
+    a = with_friction(plant, minv, mean[:dof], mean[dof : 2 * dof], mode, free, load.time)[0]
+    return a, _held(plant, minv, rates[dof : 2 * dof], mode == 0)
 
 
 def _held(plant, minv, by_state, sticking):
@@ -298,23 +301,22 @@ def _held(plant, minv, by_state, sticking):
 
 
 def _most_probable_mode(
-    plant, minv, select, c, mean, covariance, mode, overrun, load: Load, y, use, variance, gain, nothing
+    plant, minv, select, c, mean, covariance, mode, overrun, load: Load, without, y, use, variance, gain, nothing
 ):
     """Acceleration and slope in the mode that the reading and the estimated speed make most probable, and the
-    reading's `log_share`.
+    reading's `log_share`; `without` friction they are known.
 
     A reading that is not used has no say in the mode.
     """
     dof = plant.dof
     row = plant.friction.direction[0]
-    x, v, z = mean[:dof], mean[dof : 2 * dof], mean[2 * dof :]
+    x, v = mean[:dof], mean[dof : 2 * dof]
     speed = jnp.sum(row * v)
     power = jnp.sum(row[:, None] * covariance[dof : 2 * dof, dof : 2 * dof] * row[None, :])
     spread = jnp.sqrt(jnp.maximum(power, 0.0) + nothing**2)
     certain = jnp.where(spread > 0, speed / jnp.where(spread > 0, spread, 1.0), jnp.sign(speed) * _FAR)
     low, high = friction_limits(plant, x, jnp.zeros(dof), load.time)
-    free = free_acceleration(plant, minv, x, v, z, load.force[0], load.time)
-    held = holding_force(plant, minv, free, jnp.ones(1, bool))[0]
+    held = holding_force(plant, minv, without[0], jnp.ones(1, bool))[0]
     can_stick = (held <= high[0]) & (held >= low[0])
     # What comes to rest where it can be held stays there: it slides still as it did, or it rests.
     came = jnp.where(mode == 0, -jnp.sign(overrun), mode)
@@ -326,7 +328,7 @@ def _most_probable_mode(
     log_likely = jnp.log(_UNFORESEEN / 3 + (1.0 - _UNFORESEEN) * likely)
 
     def judge(mode):
-        a, by_state = _acceleration_and_slope(plant, minv, mean, mode[None], load)
+        a, by_state = _in_mode(plant, minv, mean, mode[None], load, *without)
         line = gain * jnp.sum(select[:, None] * by_state, 0)
         total = jnp.sum(line[:, None] * covariance * line[None, :]) + variance
         error = y - gain * jnp.sum(select * (a + load.base[0])) - plant.channel_offset[c]

@@ -3,6 +3,7 @@
 from ._fit import Fit as Fit
 from ._fit import fit as fit
 from ._fit import without_small_offsets as without_small_offsets
+from ._maximise import LADDER as LADDER
 from ._maximise import Maximum as Maximum
 from ._maximise import approach as approach
 from ._maximise import finish as finish

@@ -6,8 +6,10 @@ matrix is the plant. That matrix is data: another place, sign or law leaves the 
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -50,19 +52,38 @@ def with_vector(plant: Plant, vector: Float[Array, " size"]) -> Plant:
     return replace(plant, **parts)
 
 
+class _Layout:
+    """A structure, equal to every other that differs from it in numbers only."""
+
+    def __init__(self, structure: Structure):
+        self.structure = structure
+        self.key = jax.tree.structure(structure), structure.mass.shape
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Layout) and self.key == other.key
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+
 def plant_rows(
     structure: Structure, paths: Sequence[str], channels: Sequence[Channel], **slots: Any
 ) -> Float[np.ndarray, "paths size"]:
-    """Derivative of the plant's vector by each of the structure's numbers `paths`.
+    """Derivative of the plant's vector by each of the structure's numbers `paths`; it depends on no number's value."""
+    return _rows(_Layout(structure), tuple(paths), tuple(channels), tuple(slots.items()))
 
-    The plant is linear in each, so doubling a number shows it exactly.
-    """
-    base, values = plant_vector(numbers_of(structure, channels, **slots)), structure.values()
+
+@lru_cache(maxsize=512)
+def _rows(layout: _Layout, paths: tuple[str, ...], channels: tuple[Channel, ...], slots) -> np.ndarray:
+    """As the plant is linear in each number, doubling it shows its row exactly."""
+    structure, how = layout.structure, dict(slots)
+    base, values = plant_vector(numbers_of(structure, channels, **how)), structure.values()
     rows = []
     for path in paths:
         value = values[path]
         step = value if value != 0 else 1.0
-        rows.append(
-            (plant_vector(numbers_of(structure.with_values({path: value + step}), channels, **slots)) - base) / step
-        )
-    return np.array(rows).reshape(len(paths), base.size)
+        doubled = numbers_of(structure.with_values({path: value + step}), channels, **how)
+        rows.append((plant_vector(doubled) - base) / step)
+    found = np.array(rows).reshape(len(paths), base.size)
+    found.setflags(write=False)
+    return found

@@ -1,7 +1,7 @@
 """What every hypothesis on a record shares: its noise, its reconstructed drive, its unknown start and offsets."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import jax.numpy as jnp
 import numpy as np
@@ -83,6 +83,7 @@ class Nuisances:
     reconstruction: Reconstruction
     notes: tuple[str, ...]
     path: Path | None = None
+    _heads: dict[int, tuple[Fine | Imposed, Readings]] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def samples(self) -> int:
@@ -114,7 +115,9 @@ class Nuisances:
     def head(self, until: int) -> tuple[Fine | Imposed, Readings]:
         """What is imposed, and the readings, cut to the padded length of the first `until` samples."""
         n, r = min(bucket(until), self.fine.time.shape[0]), self.readings
-        return self.fine.head(n), Readings(r.values[:n], r.use[:n], r.variance, r.valid[:n])
+        if n not in self._heads:
+            self._heads[n] = self.fine.head(n), Readings(r.values[:n], r.use[:n], r.variance, r.valid[:n])
+        return self._heads[n]
 
     def resolving(self, structures: Sequence[Structure]) -> "Nuisances":
         """The same record with steps short enough for all of these structures."""

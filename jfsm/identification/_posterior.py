@@ -261,11 +261,10 @@ def slackened(nuisances: Nuisances, share: float) -> ProcessNoise:
     """Process noise that also forgives an unmodelled force of `share` of the elastic force."""
     if isinstance(nuisances.fine, Imposed):
         size = share * np.max(nuisances.spread[nuisances.judged])
-        return ProcessNoise(size**2 * jnp.eye(nuisances.fine.a.shape[1]))
+        return ProcessNoise(jnp.asarray(size**2 * np.eye(nuisances.fine.a.shape[1])))
     size = share * nuisances.omega**2 * nuisances.length
-    noise = nuisances.noise
-    forgiven = size**2 / nuisances.omega * nuisances.record.dt
-    return ProcessNoise(noise.velocity + forgiven * jnp.eye(noise.velocity.shape[0]))
+    forgiven, known = size**2 / nuisances.omega * nuisances.record.dt, np.asarray(nuisances.noise.velocity)
+    return ProcessNoise(jnp.asarray(known + forgiven * np.eye(len(known))))
 
 
 def prior(unknowns: Sequence[Unknown], theta: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
