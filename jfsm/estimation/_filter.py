@@ -136,15 +136,16 @@ def innovations(
         still = (motion.mode == 0) & (pushed <= nothing)
         v = v - stopping(minv, rows, jnp.sum(rows * v[None, :], 1), still)
         motion = Motion(x, v, settle(plant, x, z), mode_at(plant, minv, x, v, z, g[0], time, still))
+        past = remember(past, x, v)
         after = advance_sample(plant, minv, motion, g, base, time, dt)
-        middle = jax.tree.map(lambda a, b: (a + b) / 2, motion[:3], after[:3])
-        free, rates = linearised(plant, minv, *middle, g[g.shape[0] // 2], time + dt / 2)
+        x, v, z = ((a + b) / 2 for a, b in zip(motion[:3], after[:3], strict=True))
+        free, rates = linearised(plant, minv, x, v, z, g[g.shape[0] // 2], time + dt / 2)
         step = _transition(plant, minv, motion, after, rates, dt, fine.substeps)
         moving = _product(_product(step, updated), step.T) + added
-        slope = with_friction(plant, minv, *middle[:2], motion.mode, free, time + dt / 2)[0]
+        slope = with_friction(plant, minv, x, v, motion.mode, free, time + dt / 2)[0]
         overrun = _overrun(plant, motion, after, moving, slope, dt)
         keep = valid > 0
-        onward = (after, remember(past, x, v), _rest(plant, minv, moving, after.mode), overrun)
+        onward = (after, past, _rest(plant, minv, moving, after.mode), overrun)
         return jax.tree.map(lambda new, old: jnp.where(keep, new, old), onward, carry), found
 
     motion, past = begin(plant, minv, start.x, start.v, fine)
