@@ -48,3 +48,12 @@ def test_a_cause_that_leaves_something_is_no_surer_than_the_share_that_it_explai
 def test_a_cause_that_leaves_nothing_is_as_sure_as_its_evidence():
     found, rival = shares(trial(9000.0, 0.0, "coulomb"), trial(8000.0, 0.04, "quadratic_damping"))
     assert found > 0.995 and rival < 0.005
+
+
+@pytest.mark.parametrize(("other", "verdict"), [("cubic_hardening", "undecided"), ("smooth_coulomb", "cause")])
+def test_no_cause_is_named_that_is_hardly_likelier_than_one_of_another_family_and_leaves_something(other, verdict):
+    refitted = trial(1000.0, 0.04)
+    tried = [trial(9000.0, 0.01, "coulomb"), trial(8990.0, 0.0105, other)]
+    decision = decide(GIVEN, refitted, tried, lambda t: None, periods=100.0)
+    assert decision.verdict == verdict
+    assert 0.4 < decision.share(tried[0]) < 0.55 and 0.2 < decision.share(tried[1]) < 0.4

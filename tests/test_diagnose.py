@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 import jfsm
 from jfsm.diagnosis._candidates import Candidate, promising
 from jfsm.diagnosis._effect import Effect
+from jfsm.diagnosis._gain import Gain
 from jfsm.identification import _likelihood
 
 MASS, STIFFNESS, DAMPING, CUBIC = 2.0, 18.0, 0.5, 4.0
@@ -107,6 +108,17 @@ def test_the_verdict_is_written_as_json_and_as_a_page(hidden_cubic, tmp_path):
     page = (tmp_path / "d.html").read_text()
     assert "cubic" in page
     assert "http" not in page.replace("http://www.w3.org", "")
+
+
+def test_a_cause_that_makes_held_out_runs_worse_is_not_named(believed, monkeypatch):
+    worse = Gain(before=0.1, refitted=0.1, after=0.2, floor=0.01, channels={})
+    monkeypatch.setattr("jfsm.diagnosis._diagnose.measure_gain", lambda *arguments: (worse, []))
+    d = jfsm.diagnose(made(duffing), believed, causes=FEW, key=jax.random.key(0))
+    assert d.verdict == "undecided"
+    assert d.findings == ()
+    assert "cubic_stiffness@0-1.k3" not in d.extended.values()
+    refused = next(c for c in d.candidates if c.cause == "cubic_hardening")
+    assert refused.why == "runs worse on held-out readings than the model as given"
 
 
 def test_the_same_key_gives_the_same_answer(hidden_cubic, believed):

@@ -8,7 +8,7 @@ no cause is more probable than the share of the power that it explains.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,6 +55,10 @@ class Decision:
     def share(self, trial: Trial) -> float:
         """Probability of a trial; 0 for one that is no alternative."""
         return self.probability.get(id(trial), 0.0)
+
+    def refused(self, why: str, instead: Trial) -> "Decision":
+        """The decision without its winner, which something else speaks against."""
+        return replace(self, verdict="undecided", winner=instead, why=self.why | {id(self.winner): why})
 
 
 def adequate(trial: Trial) -> bool:
@@ -136,12 +140,12 @@ def decide(
     stands = imposed and bool(winner.effects) and _almost_all(winner, refitted)
     mapped = None if adequate(winner) or stands else stand_in(winner)
     verdict = _verdict(given, refitted, winner, tried, mapped)
-    if verdict == "cause" and chance[id(winner)] < 0.5:
-        if sum(chance[id(t)] for t in passing if families(t) == families(winner)) < 0.8:
-            verdict = "undecided"
+    family = sum(chance[id(t)] for t in passing if families(t) == families(winner))
     if verdict == "cause" and not adequate(winner):
         # The rest may be the work of another law than the catalogue's: no name is surer than what it explains.
         chance = {which: p * kappa[id(winner)] for which, p in chance.items()}
+    if verdict == "cause" and chance[id(winner)] < 0.5 and family < 0.8:
+        verdict = "undecided"
     if verdict == "consistent":
         winner = given
     elif verdict == "unnamed" and mapped is not None:

@@ -17,13 +17,15 @@ from ._clipped import beside_clipping, limited
 from ._decide import decide, something_left, strained
 from ._detectable import also_detectable
 from ._diagnosis import Diagnosis
-from ._gain import measure_gain
+from ._gain import Gain, measure_gain
 from ._report import Tested, assemble
 from ._residual import residual, stand_in
 from ._search import fit_model, search, search_pairs
 from ._trial import Trial
 
 _HEAVIER = 0.03
+_WORSE = 1.5
+"""Error on held-out readings, in errors of the model as given, from which a cause makes the model worse."""
 Progress = Callable[[str, int, int], None]
 
 
@@ -91,7 +93,7 @@ def diagnose(
     records = prepare_all(whole, model, reconstruction)
     every = candidates(model, records, chosen, places)
     tried, left_out = promising(every)
-    steps = _Steps(progress, 3)
+    steps = _Steps(progress, 4)
 
     steps.next("the model as given and refitted")
     given, refitted = fit_model(model, records, until)
@@ -109,25 +111,32 @@ def diagnose(
         if effects:
             found = search_pairs(effects, trials, model, refitted, records, until, steps.next)
             trials, behind = trials + found.trials, behind + found.behind
-    steps.next("the missing force")
+    steps.next("the verdict")
     periods = sum(n.record.duration for n in records) * records[0].omega / (2 * math.pi)
     decision = decide(given, refitted, trials, lambda t: stand_in(t, records, until), periods, imposed=imposed)
     if clipped:
         decision = beside_clipping(decision, clipped, refitted)
+    first = records[0]
+
+    def gained(extended: Structure) -> tuple[Gain | None, list[dict]]:
+        if not held:
+            return None, []
+        noise = _noise_levels(decision.winner, first)
+        return measure_gain(stated, refitted.extended(), extended, held, noise, first.omega, first.reconstruction, key)
+
+    steps.next("the gain on held-out readings")
     extended = model if decision.verdict == "consistent" else decision.winner.extended()
+    gain, runs = gained(extended)
+    if gain is not None and decision.verdict == "cause" and gain.after > _WORSE * gain.before:
+        decision = decision.refused("runs worse on held-out readings than the model as given", refitted)
+        extended = refitted.extended()
+        gain, runs = gained(extended)
+    steps.next("the missing force")
     term = decision.named_term
     # Shown beside a law is the force that it stands for, with the own values that go with it.
     lacking = refitted.structure if term is None else decision.winner.structure.without(term)
     at = term.at if term is not None and term.at in lacking.links else None
-    missing = residual(lacking, records[0], until[0], at)
-    steps.next("the gain on held-out readings")
-    gain, runs = None, []
-    if held:
-        first = records[0]
-        noise = _noise_levels(decision.winner, first)
-        gain, runs = measure_gain(
-            stated, refitted.extended(), extended, held, noise, first.omega, first.reconstruction, key
-        )
+    missing = residual(lacking, first, until[0], at)
     unseen = []
     if decision.verdict in ("consistent", "undecided"):  # silence is worth what would have been heard
         steps.next("what would have been seen")
