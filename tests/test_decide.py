@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.diagnosis._decide import decide
+from jfsm.diagnosis._decide import decide, something_left
 from jfsm.diagnosis._effect import Effect
 from jfsm.diagnosis._trial import Prediction
 
@@ -57,3 +57,11 @@ def test_no_cause_is_named_that_is_hardly_likelier_than_one_of_another_family_an
     decision = decide(GIVEN, refitted, tried, lambda t: None, periods=100.0)
     assert decision.verdict == verdict
     assert 0.4 < decision.share(tried[0]) < 0.55 and 0.2 < decision.share(tried[1]) < 0.4
+
+
+@pytest.mark.parametrize(("left", "worth"), [(1.5e-3, False), (2.5e-3, True)])
+def test_a_second_effect_is_looked_for_where_more_is_left_than_chance_leaves(left: float, worth: bool):
+    refitted, best = trial(0.0, 1.0), trial(9000.0, left, "coulomb")
+    scatter = np.full(2, 5e-4)
+    best.prediction = Prediction(best.prediction.error, best.prediction.expected, scatter)
+    assert something_left([refitted, best], refitted, imposed=False) == worth

@@ -72,7 +72,7 @@ def something_left(trials: Sequence[Trial], refitted: Trial, *, imposed: bool) -
     best = max(trials, key=lambda t: t.evidence)
     if adequate(best) or best.prediction.left < NEGLIGIBLE or (imposed and _almost_all(best, refitted)):
         return False
-    return bool(np.all(best.prediction.excess >= _WORTH_A_SECOND**2 * refitted.prediction.error))
+    return bool(np.all(best.prediction.beyond >= _WORTH_A_SECOND**2 * refitted.prediction.error))
 
 
 def strained(trials: Sequence[Trial]) -> bool:

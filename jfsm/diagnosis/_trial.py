@@ -40,10 +40,14 @@ class Prediction:
         return np.maximum(self.error - self.expected, 0.0)
 
     @property
+    def beyond(self) -> np.ndarray:
+        """Power beyond noise and chance, per set."""
+        return np.maximum(self.error - self.expected - _CHANCE * self.scatter, 0.0)
+
+    @property
     def left(self) -> float:
         """What is left beyond noise and chance, as a share of the signal; of the worst set."""
-        beyond = self.error - self.expected - _CHANCE * self.scatter
-        return math.sqrt(max(float(np.max(beyond)), 0.0))
+        return math.sqrt(float(np.max(self.beyond)))
 
 
 @dataclass(frozen=True)
