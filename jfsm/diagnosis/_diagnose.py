@@ -12,11 +12,12 @@ from ..dynamics import Reconstruction
 from ..identification import Nuisances, prepare_all
 from ..records import Record
 from ..structures import AccelerationGain, Cause, ForceGain, Structure
-from ._candidates import candidates, chosen_causes, promising
+from ._candidates import Candidate, candidates, chosen_causes, promising
 from ._clipped import beside_clipping, limited
 from ._decide import decide, something_left, strained
 from ._detectable import also_detectable
 from ._diagnosis import Diagnosis
+from ._effect import Effect
 from ._gain import Gain, measure_gain
 from ._report import Tested, assemble
 from ._residual import residual, stand_in
@@ -103,14 +104,10 @@ def diagnose(
         given, refitted = fit_model(model, records, until, near=refitted.structure)
     imposed = records[0].path is not None
     trials, behind = search(tried, model, given, refitted, records, until, steps.next)
-    if max_causes > 1:
-        alone = [given, refitted, *trials]
-        effects = [effect for candidate in every for effect in candidate.effects]
-        if not something_left(alone, refitted, imposed=imposed):  # a gain may hide in own values
-            effects = [e for e in effects if e.cause.effect in (ForceGain, AccelerationGain) and strained(alone)]
-        if effects:
-            found = search_pairs(effects, trials, model, refitted, records, until, steps.next)
-            trials, behind = trials + found.trials, behind + found.behind
+    effects = _beside([given, refitted, *trials], refitted, every, imposed=imposed) if max_causes > 1 else []
+    if effects:
+        found = search_pairs(effects, trials, model, refitted, records, until, steps.next)
+        trials, behind = trials + found.trials, behind + found.behind
     steps.next("the verdict")
     periods = sum(n.record.duration for n in records) * records[0].omega / (2 * math.pi)
     decision = decide(given, refitted, trials, lambda t: stand_in(t, records, until), periods, imposed=imposed)
@@ -145,6 +142,15 @@ def diagnose(
         unseen = also_detectable(left_out + laws, model, records, until)
     tested = Tested(trials, behind, left_out, unseen)
     return assemble(decision, clipped, refitted, tested, model, extended, records, missing, gain, runs)
+
+
+def _beside(alone: list[Trial], refitted: Trial, every: list[Candidate], *, imposed: bool) -> list[Effect]:
+    """Effects that are worth a try beside others, after what single ones leave."""
+    effects = [effect for candidate in every for effect in candidate.effects]
+    if something_left(alone, refitted, imposed=imposed):
+        return effects
+    # A gain may hide in own values.
+    return [e for e in effects if e.cause.effect in (ForceGain, AccelerationGain)] if strained(alone) else []
 
 
 def _outweighed(model: Structure, refitted: Structure) -> bool:

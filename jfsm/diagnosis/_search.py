@@ -124,11 +124,10 @@ def fit_model(
         for refit in (False, True)
     ]
     posteriors[0].evaluate(posteriors[0].initial())  # compiled once, before both ask for it
+    climbed = side_by_side(climb, posteriors)
     given, refitted = (
         trial(posterior, found, int(np.argmin(found.value)), rung, name)
-        for name, posterior, (found, rung) in zip(
-            ("given", "refitted"), posteriors, side_by_side(climb, posteriors), strict=True
-        )
+        for name, posterior, (found, rung) in zip(("given", "refitted"), posteriors, climbed, strict=True)
     )
     return given, refitted
 

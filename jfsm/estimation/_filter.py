@@ -259,7 +259,7 @@ def _predict(plant, minv, show, c, mean, covariance, mode, overrun, load: Load, 
             nothing[0],
         )  # fmt: skip
     else:
-        (a, by_state), log_share = _in_mode(plant, minv, mean, mode, load, *without), certain
+        (a, by_state), log_share = _moving_in(plant, minv, mean, mode, load, *without), certain
     return jnp.sum(select * (a + load.base[0])), jnp.sum(select[:, None] * by_state, 0), log_share
 
 
@@ -282,7 +282,7 @@ def _late(plant, minv, show, tau, mean, mode, load: Load, force, base):
     return jax.vmap(lambda e: jax.jvp(readings, (mean,), (e,)), out_axes=(None, 1))(jnp.eye(mean.size))
 
 
-def _in_mode(plant, minv, mean, mode, load: Load, free, rates):
+def _moving_in(plant, minv, mean, mode, load: Load, free, rates):
     """Acceleration in a mode, and its derivative by the state, from those without friction."""
     dof = plant.dof
     a = with_friction(plant, minv, mean[:dof], mean[dof : 2 * dof], mode, free, load.time)[0]
@@ -329,7 +329,7 @@ def _most_probable_mode(
     log_likely = jnp.log(_UNFORESEEN / 3 + (1.0 - _UNFORESEEN) * likely)
 
     def judge(mode):
-        a, by_state = _in_mode(plant, minv, mean, mode[None], load, *without)
+        a, by_state = _moving_in(plant, minv, mean, mode[None], load, *without)
         line = gain * jnp.sum(select[:, None] * by_state, 0)
         total = jnp.sum(line[:, None] * covariance * line[None, :]) + variance
         error = y - gain * jnp.sum(select * (a + load.base[0])) - plant.channel_offset[c]
