@@ -63,8 +63,12 @@ class Decision:
 
 def adequate(trial: Trial) -> bool:
     """Whether a trial leaves nothing but noise: white innovations of the size of the floor, no excess."""
-    scales = np.abs(trial.noise[trial.trusted])
-    return trial.whiteness < _WHITE and bool(np.all(scales < _SCALE)) and trial.prediction.left < NEGLIGIBLE
+    return white(trial) and trial.prediction.left < NEGLIGIBLE
+
+
+def white(trial: Trial) -> bool:
+    """Whether a trial's innovations are white, and of the size of the floor where that is known."""
+    return trial.whiteness < _WHITE and bool(np.all(np.abs(trial.noise[trial.trusted]) < _SCALE))
 
 
 def something_left(trials: Sequence[Trial], refitted: Trial, *, imposed: bool) -> bool:

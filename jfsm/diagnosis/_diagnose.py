@@ -9,10 +9,11 @@ import numpy as np
 
 from .._types import require_x64
 from ..dynamics import Reconstruction
-from ..identification import Nuisances, prepare_all
+from ..identification import prepare_all
 from ..records import Record
 from ..structures import AccelerationGain, Cause, ForceGain, Structure
 from ._candidates import Candidate, candidates, chosen_causes, promising
+from ._chance import beside_chance, noise_levels
 from ._clipped import beside_clipping, limited
 from ._decide import decide, something_left, strained
 from ._detectable import also_detectable
@@ -104,10 +105,12 @@ def diagnose(
         given, refitted = fit_model(model, records, until, near=refitted.structure)
     imposed = records[0].path is not None
     trials, behind = search(tried, model, given, refitted, records, until, steps.next)
+    given, refitted, *trials = beside_chance([given, refitted, *trials], model, records, until, key)
     effects = _beside([given, refitted, *trials], refitted, every, imposed=imposed) if max_causes > 1 else []
     if effects:
         found = search_pairs(effects, trials, model, refitted, records, until, steps.next)
-        trials, behind = trials + found.trials, behind + found.behind
+        every_trial, behind = [given, refitted, *trials, *found.trials], behind + found.behind
+        given, refitted, *trials = beside_chance(every_trial, model, records, until, key)
     steps.next("the verdict")
     periods = sum(n.record.duration for n in records) * records[0].omega / (2 * math.pi)
     decision = decide(given, refitted, trials, lambda t: stand_in(t, records, until), periods, imposed=imposed)
@@ -118,7 +121,7 @@ def diagnose(
     def gained(extended: Structure) -> tuple[Gain | None, list[dict]]:
         if not held:
             return None, []
-        noise = _noise_levels(decision.winner, first)
+        noise = noise_levels(decision.winner, first)
         return measure_gain(stated, refitted.extended(), extended, held, noise, first.omega, first.reconstruction, key)
 
     steps.next("the gain on held-out readings")
@@ -192,14 +195,3 @@ def split(record: Record | Sequence[Record], holdout) -> tuple[list[tuple[Record
         ends = [int(round((1 - holdout) * len(r))) for r in records]
         return list(zip(records, ends, strict=True)), [r[end:] for r, end in zip(records, ends, strict=True)]
     return [(r, len(r)) for r in records], list(holdout)
-
-
-def _noise_levels(winner: Trial, nuisances: Nuisances) -> dict[tuple, float]:
-    """Standard deviation of every channel's noise: of responses as the winner found it, of forces at their floor."""
-    levels = {
-        c: float(f * math.exp(s / 2))
-        for c, f, s in zip(nuisances.channels, nuisances.floor, winner.noise, strict=False)
-    }
-    for j, variance in enumerate(nuisances.force_variance):
-        levels["force", j + 1] = math.sqrt(float(variance))
-    return levels

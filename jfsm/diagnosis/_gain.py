@@ -139,13 +139,14 @@ def _noise(
             c: (run[c] if c in run else y) + levels.get(c, 0.0) * rng.standard_normal(len(record))
             for c, y in record.channels.items()
         }
-        again = _run(model, _like(record, noisy), window, reconstruction)
+        again = _run(model, remeasured(record, noisy), window, reconstruction)
         for c in total:
             total[c] += float(np.mean((again[c] - run[c])[_counted(record, window)] ** 2)) / _DRAWS
     return {c: total[c] + levels.get(c, 0.0) ** 2 for c in total}
 
 
-def _like(record: Record, channels: dict[tuple, np.ndarray]) -> Record:
+def remeasured(record: Record, channels: Mapping[tuple, np.ndarray]) -> Record:
+    """The record with other samples in its channels."""
     kinds: dict[str, Any] = {}
     for (kind, j), y in channels.items():
         kinds.setdefault(kind, {})[j] = y

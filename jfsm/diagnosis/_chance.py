@@ -1,0 +1,87 @@
+"""What noise leaves of a hypothesis: of records simulated from it, predicted as the measured one was.
+
+The filter tells it to first order, and from the noise that a channel was taken to have. Where a motion sticks, strikes
+or leaves a well, small errors grow otherwise; and where a channel's signal fills its band, only a fit tells its noise.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import jax
+import numpy as np
+
+from .._threads import side_by_side
+from ..dynamics._grid import Fine
+from ..identification import Hypothesis, Nuisances, Posterior, prepare_all
+from ..records import Record
+from ..structures import Clipping, Structure
+from ._decide import adequate, white
+from ._gain import remeasured
+from ._trial import Prediction, Trial, predict
+
+_DRAWS = 6
+
+
+def beside_chance(
+    trials: Sequence[Trial], model: Structure, records: Sequence[Nuisances], until: Sequence[int], key: jax.Array
+) -> list[Trial]:
+    """The trials; the most probable, if its innovations are white and yet it leaves something, with draws of noise."""
+    best = max(trials, key=lambda t: t.evidence)
+    limits = any(isinstance(sensor, Clipping) for sensor in model.sensors)
+    if adequate(best) or not white(best) or limits or records[0].path is not None:
+        return list(trials)
+    records = [n.resolving([best.structure]) for n in records]
+    posterior = Posterior(Hypothesis((best.structure,), (best.unknowns,)), records, until)
+    runs = [_run(posterior, best.theta, index) for index in range(len(records))]
+    if not all(np.all(np.isfinite(run)) for run in runs):
+        return list(trials)
+    levels = [noise_levels(best, n, index) for index, n in enumerate(records)]
+    seeds = np.asarray(jax.random.key_data(key)).astype(np.uint32).tolist()
+
+    def draw(rng: np.random.Generator) -> np.ndarray:
+        noisy = [_noisy(*parts, rng) for parts in zip(records, runs, levels, strict=True)]
+        again = prepare_all(noisy, model, records[0].reconstruction, weighed=best.structure)
+        again = [n.resolving([best.structure]) for n in again]
+        simulated = Posterior(posterior.hypothesis, again, until)
+        return predict(simulated, best.theta, slight=not best.effects).error
+
+    errors = np.array(list(side_by_side(draw, np.random.default_rng(seeds).spawn(_DRAWS))))
+    found = best.prediction
+    prediction = Prediction(
+        error=found.error,
+        expected=np.maximum(found.expected, errors.mean(0)),
+        scatter=np.maximum(found.scatter, errors.std(0, ddof=1)),
+    )
+    return [replace(t, prediction=prediction) if t is best else t for t in trials]
+
+
+def noise_levels(trial: Trial, nuisances: Nuisances, index: int = 0) -> dict[tuple, float]:
+    """Standard deviation of every channel's noise in record `index`: of responses as fitted, of forces at its floor."""
+    fitted = zip(trial.unknowns, trial.theta, strict=True)
+    scales = {u.path: float(theta) for u, theta in fitted if u.record in (None, index)}
+    levels = {
+        channel: float(floor) * math.exp(scales.get(f"noise@{c}", 0.0) / 2)
+        for c, (channel, floor) in enumerate(zip(nuisances.channels, nuisances.floor, strict=True))
+    }
+    return levels | {("force", j + 1): math.sqrt(float(v)) for j, v in enumerate(nuisances.force_variance)}
+
+
+def _run(posterior: Posterior, theta: np.ndarray, index: int) -> np.ndarray:
+    """Readings (n, channels) of a free run: those that a filter predicts which uses none."""
+    nuisances = posterior.records[index]
+    none = np.zeros((nuisances.samples, len(nuisances.channels)))
+    free = posterior.innovations(theta, index, use=none)
+    return np.asarray(nuisances.readings.values)[: nuisances.samples] - free.error
+
+
+def _noisy(nuisances: Nuisances, run: np.ndarray, levels: dict[tuple, float], rng: np.random.Generator) -> Record:
+    """The record of a run under the force as it is taken to be, with fresh noise on every channel."""
+    assert isinstance(nuisances.fine, Fine)
+    force = np.asarray(nuisances.fine.force)[: nuisances.samples, 0]
+    truth = dict(zip(nuisances.channels, run.T, strict=True))
+    truth |= {channel: force[:, channel[1] - 1] for channel in nuisances.record.channels if channel[0] == "force"}
+    return remeasured(
+        nuisances.record,
+        {channel: y + levels.get(channel, 0.0) * rng.standard_normal(y.size) for channel, y in truth.items()},
+    )

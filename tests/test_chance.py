@@ -1,0 +1,50 @@
+"""What noise leaves of a hypothesis, told by records that are simulated from it."""
+
+from dataclasses import replace
+
+import jax
+import numpy as np
+import pytest
+
+import jfsm
+from jfsm.demo import DAMPING, FRICTION, MASS, STIFFNESS, hidden_friction
+from jfsm.diagnosis._chance import beside_chance
+from jfsm.diagnosis._decide import NEGLIGIBLE, adequate
+from jfsm.diagnosis._search import fit_model
+from jfsm.diagnosis._trial import Trial
+from jfsm.identification import prepare_all
+from jfsm.structures import Coulomb
+
+SAMPLES = 1200
+UNTIL = [800]
+
+
+@pytest.fixture(scope="module")
+def record() -> jfsm.Record:
+    return hidden_friction(3, samples=SAMPLES).record
+
+
+def judged(record: jfsm.Record, stiffness: float) -> tuple[Trial, Trial]:
+    """A model that rubs, as the record does, before and after what noise leaves of it is drawn."""
+    model = jfsm.Structure.sdof(MASS, stiffness, DAMPING) + Coulomb(FRICTION, at=(0, 1))
+    records = prepare_all([record], model)
+    given, _ = fit_model(model, records, UNTIL)
+    # A model whose values are off is told by its innovations too; here what it leaves has to tell alone.
+    given = replace(given, whiteness=0.0, noise=np.where(given.trusted, 0.0, given.noise))
+    (drawn,) = beside_chance([given], model, records, UNTIL, jax.random.key(1))
+    return given, drawn
+
+
+def test_noise_that_a_filter_underestimates_is_not_something_left(record):
+    # Velocity and acceleration fill their bands, so that no smooth curve tells their noise.
+    first, drawn = judged(record, STIFFNESS)
+    assert first.prediction.left > 0 and not drawn.prediction.left
+    assert np.all(drawn.prediction.expected > 1.2 * first.prediction.expected)
+    assert np.all(np.abs(drawn.prediction.error - drawn.prediction.expected) < 4 * drawn.prediction.scatter)
+
+
+def test_noise_is_no_excuse_for_a_value_that_is_off(record):
+    first, drawn = judged(record, 1.05 * STIFFNESS)
+    assert drawn is not first, "nothing was drawn"
+    assert drawn.prediction.left > 0.8 * first.prediction.left > NEGLIGIBLE
+    assert not adequate(drawn)
