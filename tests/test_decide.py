@@ -34,7 +34,7 @@ GIVEN, REFITTED = trial(0.0, 0.5), trial(1000.0, 0.1)
 
 
 def shares(*tried: Any) -> list[float]:
-    decision = decide(GIVEN, REFITTED, tried, lambda t: None, periods=100.0)
+    decision = decide(GIVEN, REFITTED, tried, lambda t: None, lambda t: None, periods=100.0)
     assert decision.verdict == "cause" and decision.winner is tried[0]
     return [decision.share(t) for t in tried]
 
@@ -54,7 +54,7 @@ def test_a_cause_that_leaves_nothing_is_as_sure_as_its_evidence():
 def test_no_cause_is_named_that_is_hardly_likelier_than_one_of_another_family_and_leaves_something(other, verdict):
     refitted = trial(1000.0, 0.04)
     tried = [trial(9000.0, 0.01, "coulomb"), trial(8990.0, 0.0105, other)]
-    decision = decide(GIVEN, refitted, tried, lambda t: None, periods=100.0)
+    decision = decide(GIVEN, refitted, tried, lambda t: None, lambda t: None, periods=100.0)
     assert decision.verdict == verdict
     assert 0.4 < decision.share(tried[0]) < 0.55 and 0.2 < decision.share(tried[1]) < 0.4
 

@@ -13,12 +13,12 @@ import numpy as np
 
 from .._threads import side_by_side
 from ..dynamics._grid import Fine
-from ..identification import Hypothesis, Nuisances, Posterior, prepare_all
+from ..identification import Nuisances, prepare_all
 from ..records import Record
 from ..structures import Clipping, Structure
 from ._decide import adequate, white
 from ._gain import remeasured
-from ._trial import Prediction, Trial, predict
+from ._trial import Prediction, Trial, free_run, predict
 
 _DRAWS = 6
 
@@ -31,9 +31,8 @@ def beside_chance(
     limits = any(isinstance(sensor, Clipping) for sensor in model.sensors)
     if adequate(best) or not white(best) or limits or records[0].path is not None:
         return list(trials)
-    records = [n.resolving([best.structure]) for n in records]
-    posterior = Posterior(Hypothesis((best.structure,), (best.unknowns,)), records, until)
-    runs = [_run(posterior, best.theta, index) for index in range(len(records))]
+    posterior = best.posterior(records, until)
+    runs = [free_run(posterior, best.theta, index) for index in range(len(records))]
     if not all(np.all(np.isfinite(run)) for run in runs):
         return list(trials)
     levels = [noise_levels(best, n, index) for index, n in enumerate(records)]
@@ -42,9 +41,7 @@ def beside_chance(
     def draw(rng: np.random.Generator) -> np.ndarray:
         noisy = [_noisy(*parts, rng) for parts in zip(records, runs, levels, strict=True)]
         again = prepare_all(noisy, model, records[0].reconstruction, weighed=best.structure)
-        again = [n.resolving([best.structure]) for n in again]
-        simulated = Posterior(posterior.hypothesis, again, until)
-        return predict(simulated, best.theta, slight=not best.effects).error
+        return predict(best.posterior(again, until), best.theta, slight=not best.effects).error
 
     errors = np.array(list(side_by_side(draw, np.random.default_rng(seeds).spawn(_DRAWS))))
     found = best.prediction
@@ -65,14 +62,6 @@ def noise_levels(trial: Trial, nuisances: Nuisances, index: int = 0) -> dict[tup
         for c, (channel, floor) in enumerate(zip(nuisances.channels, nuisances.floor, strict=True))
     }
     return levels | {("force", j + 1): math.sqrt(float(v)) for j, v in enumerate(nuisances.force_variance)}
-
-
-def _run(posterior: Posterior, theta: np.ndarray, index: int) -> np.ndarray:
-    """Readings (n, channels) of a free run: those that a filter predicts which uses none."""
-    nuisances = posterior.records[index]
-    none = np.zeros((nuisances.samples, len(nuisances.channels)))
-    free = posterior.innovations(theta, index, use=none)
-    return np.asarray(nuisances.readings.values)[: nuisances.samples] - free.error
 
 
 def _noisy(nuisances: Nuisances, run: np.ndarray, levels: dict[tuple, float], rng: np.random.Generator) -> Record:

@@ -3,7 +3,8 @@
 A cause must do three things: be more probable than its absence, explain at least half of the power that a refit of the
 model leaves, and do so on every set of samples, held-out ones included. Where the winner leaves nothing but noise, its
 evidence is trusted as it stands; where it does not, evidence counts no more than some tens of independent looks, and
-no cause is more probable than the share of the power that it explains.
+no cause is more probable than the share of the power that it explains. And no cause is named that fits worse than some
+law of another shape beside it would, by more than the share of what it explains that is forgiven.
 """
 
 import math
@@ -14,6 +15,7 @@ import numpy as np
 
 from ..identification import prior
 from ..structures import AbstractTerm, LinearStiffness
+from ._lack_of_fit import LackOfFit
 from ._trial import Trial
 
 GATE = 0.5
@@ -32,6 +34,11 @@ _NEARLY_ALL, _MUCH = 0.8, 0.1
 """A law that explains less than this share of the excess and leaves more than this share of the signal is near."""
 _ALMOST_ALL = 0.95
 """A law that explains this share of the excess along an imposed motion stands, whatever a map makes of the rest."""
+_UNFIT = 20.0
+"""Nats that laws of other shapes must gain beside a cause, beyond chance, for it not to be named,"""
+_UNFIT_SHARE, _UNFIT_OF_WHITE = 0.1, 0.005
+"""and share of those that it gains itself (the second of two effects: beside the first); the latter where its
+innovations are white, so that all else is right."""
 _WHITE = 0.1
 _SCALE = 0.5
 _LOOKS = (10.0, 40.0)
@@ -58,7 +65,9 @@ class Decision:
 
     def refused(self, why: str, instead: Trial) -> "Decision":
         """The decision without its winner, which something else speaks against."""
-        return replace(self, verdict="undecided", winner=instead, why=self.why | {id(self.winner): why})
+        probability = self.probability | {id(self.winner): 0.0}
+        why_not = self.why | {id(self.winner): why}
+        return replace(self, verdict="undecided", winner=instead, probability=probability, why=why_not)
 
 
 def adequate(trial: Trial) -> bool:
@@ -118,14 +127,16 @@ def decide(
     refitted: Trial,
     tried: Sequence[Trial],
     stand_in: Callable[[Trial], Trial | None],
+    lack_of_fit: Callable[[Trial], LackOfFit | None],
     periods: float,
     *,
     imposed: bool = False,
 ) -> Decision:
     """Verdict over the model as given, the model refitted, every candidate, and a map that stands for any law.
 
-    `stand_in` adds to a trial the map of what it leaves; it is asked only where the winner leaves something. Along an
-    `imposed` motion a map repeats even the small faults of a law, one by one, as often as the motion repeats itself.
+    `stand_in` adds to a trial the map of what it leaves; it is asked only where the winner leaves something.
+    `lack_of_fit` tells what other laws would explain beside a trial's; it is asked of a cause that would be named.
+    Along an `imposed` motion a map repeats even the small faults of a law, one by one, as often as it repeats itself.
     """
     kappa, why = {}, {}
     passing = []
@@ -150,6 +161,12 @@ def decide(
         chance = {which: p * kappa[id(winner)] for which, p in chance.items()}
     if verdict == "cause" and chance[id(winner)] < 0.5 and family < 0.8:
         verdict = "undecided"
+    fewer = max(t.evidence for t in (given, refitted, *tried) if len(t.effects) < len(winner.effects) or t is given)
+    if verdict == "cause" and _unfit(winner, winner.evidence - fewer, lack_of_fit(winner)):
+        why[id(winner)], chance[id(winner)] = "explains much of it, but is not of the right shape", 0.0
+        mapped = stand_in(refitted)
+        stands_in = mapped is not None and explained(mapped, refitted) >= GATE
+        verdict, winner = ("unnamed", refitted) if stands_in else ("undecided", winner)
     if verdict == "consistent":
         winner = given
     elif verdict == "unnamed" and mapped is not None:
@@ -211,6 +228,14 @@ def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
         if not enough or t.evidence - alone.evidence <= SECOND:
             return f"{alone.effects[0].label} alone explains it about as well"
     return ""
+
+
+def _unfit(winner: Trial, gained: float, lack: LackOfFit | None) -> bool:
+    """Whether laws of other shapes would explain too much beside the winner, whose last effect gained so many nats."""
+    if lack is None or lack.fitted < _UNFIT or (lack.held_out is not None and lack.held_out <= 0):
+        return False
+    forgiven = _UNFIT_OF_WHITE if white(winner) else _UNFIT_SHARE
+    return lack.fitted > forgiven * gained
 
 
 def _verdict(given: Trial, refitted: Trial, winner: Trial, tried: Sequence[Trial], mapped: Trial | None) -> str:

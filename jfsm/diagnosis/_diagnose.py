@@ -20,6 +20,7 @@ from ._detectable import also_detectable
 from ._diagnosis import Diagnosis
 from ._effect import Effect
 from ._gain import Gain, measure_gain
+from ._lack_of_fit import lack_of_fit
 from ._report import Tested, assemble
 from ._residual import residual, stand_in
 from ._search import fit_model, search, search_pairs
@@ -113,7 +114,15 @@ def diagnose(
         given, refitted, *trials = beside_chance(every_trial, model, records, until, key)
     steps.next("the verdict")
     periods = sum(n.record.duration for n in records) * records[0].omega / (2 * math.pi)
-    decision = decide(given, refitted, trials, lambda t: stand_in(t, records, until), periods, imposed=imposed)
+    decision = decide(
+        given,
+        refitted,
+        trials,
+        lambda t: stand_in(t, records, until),
+        lambda t: lack_of_fit(t, records, until),
+        periods,
+        imposed=imposed,
+    )
     if clipped:
         decision = beside_clipping(decision, clipped, refitted)
     first = records[0]

@@ -1,6 +1,7 @@
 """One hypothesis fitted: its values, its evidence, and how well it predicts."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,6 +98,11 @@ class Trial:
         """The terms that the effects add; sensors add none."""
         return tuple(part for part in self.parts if isinstance(part, AbstractTerm))
 
+    def posterior(self, records: Sequence[Nuisances], until: Sequence[int]) -> Posterior:
+        """The posterior of its structure, on records in steps that are short enough for it."""
+        records = [n.resolving([self.structure]) for n in records]
+        return Posterior(Hypothesis((self.structure,), (self.unknowns,)), records, until)
+
     def extended(self) -> Structure:
         """The structure without the offsets that are not significant."""
         return without_small_offsets(self.structure, self.unknowns, self.theta, self.covariance)
@@ -148,6 +154,14 @@ def predict(posterior: Posterior, theta: np.ndarray, slight: bool = False) -> Pr
         error = np.nan_to_num(np.array(errors), nan=np.inf)
         best.append((float(np.sum(error)), Prediction(error, np.array(expected), np.array(scatter))))
     return min(best, key=lambda item: item[0])[1]
+
+
+def free_run(posterior: Posterior, theta: np.ndarray, index: int) -> np.ndarray:
+    """Readings (n, channels) of record `index` as a filter predicts them that uses none."""
+    nuisances = posterior.records[index]
+    none = np.zeros((nuisances.samples, len(nuisances.channels)))
+    free = posterior.innovations(theta, index, use=none)
+    return np.asarray(nuisances.readings.values)[: nuisances.samples] - free.error
 
 
 def _windows(nuisances: Nuisances) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,130 @@
+"""Lack of fit: what a law of any other shape, beside those of a hypothesis, would explain of its innovations.
+
+A score test (C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948, 50-57): a small force of many shapes is added to what drives
+the filter, and the innovations are regressed on what each does to them beside what the hypothesis' own unknowns do. The
+shapes are polynomials of the motion that the hypothesis itself predicts, so that no noise of the readings is in them.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from jax import Array
+
+from ..dynamics._plant import direction
+from ..identification import Nuisances, Posterior, missing_force
+from ._trial import Trial, free_run
+
+_DEGREE = 5
+"""Of the polynomials in displacement and velocity."""
+_FARTHEST = 4.0
+"""Standard deviations of the motion beyond which a shape stays as it is there."""
+_SMALL = 1e-4
+"""Size of the force that is added, as a share of the elastic force."""
+_NUDGE = 1e-2
+"""Change of an unknown that shows what it does, in its standard errors."""
+_APART = 1e-6
+"""Singular values, as shares of the largest, below which shapes are no longer told apart."""
+
+
+class LackOfFit(NamedTuple):
+    """Nats that other shapes would gain: on the readings that were fitted, beyond what noise lets them gain in the
+    mean, and with the same sizes on those that were not (None where all were fitted)."""
+
+    fitted: float
+    held_out: float | None
+
+
+class _Shown(NamedTuple):
+    """Readings of one record in their standard deviations: innovations, and how each unknown and shape moves them."""
+
+    error: np.ndarray
+    by_unknown: np.ndarray
+    by_shape: np.ndarray
+    fitted: np.ndarray
+    held_out: np.ndarray
+
+
+def lack_of_fit(trial: Trial, records: Sequence[Nuisances], until: Sequence[int]) -> LackOfFit | None:
+    """What other laws would explain where the trial has its own; None where the motion is imposed, or runs away."""
+    if records[0].path is not None:
+        return None
+    posterior = trial.posterior(records, until)
+    links = list(dict.fromkeys(law.at for law in trial.laws)) or list(trial.structure.links)
+    shapes = _shapes(trial, posterior, links)
+    if shapes is None:
+        return None
+    shown = [_shown(trial, posterior, index, shape) for index, shape in enumerate(shapes)]
+    error, by_unknown, by_shape, fitted, held_out = (np.concatenate(parts) for parts in zip(*shown, strict=True))
+    both = np.hstack([by_unknown, by_shape])
+    alone, fewer = _regressed(by_unknown[fitted], error[fitted])
+    beside, more = _regressed(both[fitted], error[fitted])
+
+    def gained(rows: np.ndarray) -> float:
+        left, less = error[rows] - by_unknown[rows] @ alone, error[rows] - both[rows] @ beside
+        return float(left @ left - less @ less) / 2
+
+    return LackOfFit(gained(fitted) - (more - fewer) / 2, gained(held_out) if np.any(held_out) else None)
+
+
+def _shapes(trial: Trial, posterior: Posterior, links: Sequence[tuple[int, int]]) -> list[np.ndarray] | None:
+    """Forces (shapes, n, dof) of unit size along the motion of every record; None where it runs away."""
+    rows = np.array([direction(link, trial.structure.dof) for link in links])
+    motions = []
+    for index, nuisances in enumerate(posterior.records):
+        run = free_run(posterior, trial.theta, index)
+        if not np.all(np.isfinite(run)):
+            return None
+        motion = missing_force(trial.structure, nuisances.showing(run), nuisances.samples)
+        motions.append(np.stack([motion.displacement @ rows.T, motion.velocity @ rows.T]))  # (2, n, links)
+    every = np.concatenate(motions, 1)
+    spread = np.maximum(every.std(1, keepdims=True), 1e-300)
+    d, w = np.clip((every - every.mean(1, keepdims=True)) / spread, -_FARTHEST, _FARTHEST)
+    found = np.stack([d**i * w**j for i in range(_DEGREE + 1) for j in range(_DEGREE + 1 - i)])
+    found = found / np.sqrt(np.mean(found**2, 1, keepdims=True))
+    forces = np.concatenate([found[:, :, i, None] * row for i, row in enumerate(rows)])
+    return np.split(forces, np.cumsum([motion.shape[1] for motion in motions])[:-1], 1)
+
+
+def _shown(trial: Trial, posterior: Posterior, index: int, shapes: np.ndarray) -> _Shown:
+    nuisances, theta = posterior.records[index], trial.theta
+    base = posterior.innovations(theta, index)
+    error, deviation = np.asarray(base.error), np.sqrt(np.maximum(base.variance, 1e-300))
+    n, channels = error.shape
+    counted = np.asarray(nuisances.readings.use)[:n] > 0
+    counted[0] = False  # the start is an unknown
+
+    def moved(then: Array, change: float) -> np.ndarray:
+        return np.where(counted, (np.asarray(then) - error) / deviation / change, 0.0).ravel()
+
+    by_unknown = []
+    for k, (u, variance) in enumerate(zip(trial.unknowns, np.diag(trial.covariance), strict=True)):
+        if u.path.startswith("noise@") or u.record not in (None, index):
+            by_unknown.append(np.zeros(error.size))
+            continue
+        change = _NUDGE * max(float(np.sqrt(max(variance, 0.0))), 1e-9)
+        nudged = theta + change * (np.arange(theta.size) == k)
+        by_unknown.append(moved(posterior.innovations(nudged, index).error, change))
+    size = _SMALL * nuisances.elastic_force(trial.structure)
+    by_shape = []
+    for shape in shapes:
+        records = list(posterior.records)
+        records[index] = nuisances.pushed(-size * shape)
+        pushed = Posterior(posterior.hypothesis, records, posterior.until)
+        by_shape.append(moved(pushed.innovations(theta, index).error, _SMALL))
+    fitted = np.repeat((np.arange(n) < posterior.until[index])[:, None], channels, 1)
+    return _Shown(
+        np.where(counted, error / deviation, 0.0).ravel(),
+        np.stack(by_unknown, 1),
+        np.stack(by_shape, 1),
+        (fitted & counted).ravel(),
+        (~fitted & counted).ravel(),
+    )
+
+
+def _regressed(columns: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, int]:
+    """Least squares, and how many of the columns are told apart."""
+    scale = np.linalg.norm(columns, axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    found, _, rank, _ = np.linalg.lstsq(columns / scale, wanted, rcond=_APART)
+    return found / scale, int(rank)
