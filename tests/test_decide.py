@@ -34,7 +34,7 @@ GIVEN, REFITTED = trial(0.0, 0.5), trial(1000.0, 0.1)
 
 
 def shares(*tried: Any) -> list[float]:
-    decision = decide(GIVEN, REFITTED, tried, lambda t: None, lambda t: None, periods=100.0)
+    decision = decide(GIVEN, REFITTED, tried, lambda t: None, lambda t: 0.0, periods=100.0)
     assert decision.verdict == "cause" and decision.winner is tried[0]
     return [decision.share(t) for t in tried]
 
@@ -54,9 +54,35 @@ def test_a_cause_that_leaves_nothing_is_as_sure_as_its_evidence():
 def test_no_cause_is_named_that_is_hardly_likelier_than_one_of_another_family_and_leaves_something(other, verdict):
     refitted = trial(1000.0, 0.04)
     tried = [trial(9000.0, 0.01, "coulomb"), trial(8990.0, 0.0105, other)]
-    decision = decide(GIVEN, refitted, tried, lambda t: None, lambda t: None, periods=100.0)
+    decision = decide(GIVEN, refitted, tried, lambda t: None, lambda t: 0.0, periods=100.0)
     assert decision.verdict == verdict
     assert 0.4 < decision.share(tried[0]) < 0.55 and 0.2 < decision.share(tried[1]) < 0.4
+
+
+@pytest.mark.parametrize(
+    ("nats", "left", "verdict"),
+    [
+        (15.0, 0.0, "cause"),
+        (30.0, 0.0, "cause"),
+        (60.0, 0.0, "undecided"),
+        (60.0, 0.002, "cause"),
+        (600.0, 0.002, "undecided"),
+    ],
+)
+def test_no_cause_is_named_beside_which_other_shapes_would_explain_much(nats: float, left: float, verdict: str):
+    found = trial(9000.0, left, "coulomb")
+    decision = decide(GIVEN, REFITTED, [found], lambda t: None, lambda t: nats, periods=100.0)
+    assert decision.verdict == verdict
+    if verdict == "undecided":
+        assert decision.winner is REFITTED and decision.share(found) == 0 and "shape" in decision.why[id(found)]
+
+
+@pytest.mark.parametrize(("nats", "verdict"), [(40.0, "cause"), (60.0, "undecided")])
+def test_the_second_of_two_effects_must_gain_more_than_other_shapes_would(nats: float, verdict: str):
+    # The pair gains 8000 nats, its second effect 1000 of them.
+    single, pair = trial(8000.0, 0.02, "coulomb"), trial(9000.0, 0.0001, "coulomb", "cubic_hardening")
+    found = decide(GIVEN, REFITTED, [single, pair], lambda t: None, lambda t: nats, periods=100.0)
+    assert found.verdict == verdict
 
 
 @pytest.mark.parametrize(("left", "worth"), [(1.5e-3, False), (2.5e-3, True)])

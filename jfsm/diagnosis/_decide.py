@@ -15,7 +15,6 @@ import numpy as np
 
 from ..identification import prior
 from ..structures import AbstractTerm, LinearStiffness
-from ._lack_of_fit import LackOfFit
 from ._trial import Trial
 
 GATE = 0.5
@@ -36,7 +35,7 @@ _ALMOST_ALL = 0.95
 """A law that explains this share of the excess along an imposed motion stands, whatever a map makes of the rest."""
 _UNFIT = 20.0
 """Nats that laws of other shapes must gain beside a cause, beyond chance, for it not to be named,"""
-_UNFIT_SHARE, _UNFIT_OF_WHITE = 0.1, 0.005
+_UNFIT_SHARE, _UNFIT_OF_WHITE = 0.05, 0.005
 """and share of those that it gains itself (the second of two effects: beside the first); the latter where its
 innovations are white, so that all else is right."""
 _WHITE = 0.1
@@ -127,7 +126,7 @@ def decide(
     refitted: Trial,
     tried: Sequence[Trial],
     stand_in: Callable[[Trial], Trial | None],
-    lack_of_fit: Callable[[Trial], LackOfFit | None],
+    lack_of_fit: Callable[[Trial], float],
     periods: float,
     *,
     imposed: bool = False,
@@ -230,12 +229,9 @@ def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
     return ""
 
 
-def _unfit(winner: Trial, gained: float, lack: LackOfFit | None) -> bool:
-    """Whether laws of other shapes would explain too much beside the winner, whose last effect gained so many nats."""
-    if lack is None or lack.fitted < _UNFIT or (lack.held_out is not None and lack.held_out <= 0):
-        return False
-    forgiven = _UNFIT_OF_WHITE if white(winner) else _UNFIT_SHARE
-    return lack.fitted > forgiven * gained
+def _unfit(winner: Trial, gained: float, nats: float) -> bool:
+    """Whether laws of other shapes would gain too much beside the winner, whose last effect gained so many nats."""
+    return nats > max(_UNFIT, (_UNFIT_OF_WHITE if white(winner) else _UNFIT_SHARE) * gained)
 
 
 def _verdict(given: Trial, refitted: Trial, winner: Trial, tried: Sequence[Trial], mapped: Trial | None) -> str:

@@ -27,44 +27,31 @@ _APART = 1e-6
 """Singular values, as shares of the largest, below which shapes are no longer told apart."""
 
 
-class LackOfFit(NamedTuple):
-    """Nats that other shapes would gain: on the readings that were fitted, beyond what noise lets them gain in the
-    mean, and with the same sizes on those that were not (None where all were fitted)."""
-
-    fitted: float
-    held_out: float | None
-
-
 class _Shown(NamedTuple):
-    """Readings of one record in their standard deviations: innovations, and how each unknown and shape moves them."""
+    """Fitted readings of a record in their standard deviations: innovations, and how unknowns and shapes move them."""
 
     error: np.ndarray
     by_unknown: np.ndarray
     by_shape: np.ndarray
-    fitted: np.ndarray
-    held_out: np.ndarray
 
 
-def lack_of_fit(trial: Trial, records: Sequence[Nuisances], until: Sequence[int]) -> LackOfFit | None:
-    """What other laws would explain where the trial has its own; None where the motion is imposed, or runs away."""
+def lack_of_fit(trial: Trial, records: Sequence[Nuisances], until: Sequence[int]) -> float:
+    """Nats that other shapes would gain where the trial has its laws, beyond what noise lets them gain in the mean.
+
+    Nothing is known, and 0 returned, where the motion is imposed or runs away.
+    """
     if records[0].path is not None:
-        return None
+        return 0.0
     posterior = trial.posterior(records, until)
     links = list(dict.fromkeys(law.at for law in trial.laws)) or list(trial.structure.links)
     shapes = _shapes(trial, posterior, links)
     if shapes is None:
-        return None
+        return 0.0
     shown = [_shown(trial, posterior, index, shape) for index, shape in enumerate(shapes)]
-    error, by_unknown, by_shape, fitted, held_out = (np.concatenate(parts) for parts in zip(*shown, strict=True))
-    both = np.hstack([by_unknown, by_shape])
-    alone, fewer = _regressed(by_unknown[fitted], error[fitted])
-    beside, more = _regressed(both[fitted], error[fitted])
-
-    def gained(rows: np.ndarray) -> float:
-        left, less = error[rows] - by_unknown[rows] @ alone, error[rows] - both[rows] @ beside
-        return float(left @ left - less @ less) / 2
-
-    return LackOfFit(gained(fitted) - (more - fewer) / 2, gained(held_out) if np.any(held_out) else None)
+    error, by_unknown, by_shape = (np.concatenate(parts) for parts in zip(*shown, strict=True))
+    left, told = _regressed(by_unknown, error)
+    less, more = _regressed(np.hstack([by_unknown, by_shape]), error)
+    return (left - less) / 2 - (more - told) / 2  # half of chi-square, less half of its mean
 
 
 def _shapes(trial: Trial, posterior: Posterior, links: Sequence[tuple[int, int]]) -> list[np.ndarray] | None:
@@ -90,17 +77,19 @@ def _shown(trial: Trial, posterior: Posterior, index: int, shapes: np.ndarray) -
     nuisances, theta = posterior.records[index], trial.theta
     base = posterior.innovations(theta, index)
     error, deviation = np.asarray(base.error), np.sqrt(np.maximum(base.variance, 1e-300))
-    n, channels = error.shape
-    counted = np.asarray(nuisances.readings.use)[:n] > 0
-    counted[0] = False  # the start is an unknown
+    counted = np.asarray(nuisances.readings.use)[: len(error)] > 0
+    counted[0], counted[posterior.until[index] :] = False, False  # the start is an unknown
+
+    def ours(readings: np.ndarray) -> np.ndarray:
+        return readings[counted] / deviation[counted]
 
     def moved(then: Array, change: float) -> np.ndarray:
-        return np.where(counted, (np.asarray(then) - error) / deviation / change, 0.0).ravel()
+        return ours(np.asarray(then) - error) / change
 
     by_unknown = []
     for k, (u, variance) in enumerate(zip(trial.unknowns, np.diag(trial.covariance), strict=True)):
         if u.path.startswith("noise@") or u.record not in (None, index):
-            by_unknown.append(np.zeros(error.size))
+            by_unknown.append(np.zeros(np.count_nonzero(counted)))
             continue
         change = _NUDGE * max(float(np.sqrt(max(variance, 0.0))), 1e-9)
         nudged = theta + change * (np.arange(theta.size) == k)
@@ -112,19 +101,12 @@ def _shown(trial: Trial, posterior: Posterior, index: int, shapes: np.ndarray) -
         records[index] = nuisances.pushed(-size * shape)
         pushed = Posterior(posterior.hypothesis, records, posterior.until)
         by_shape.append(moved(pushed.innovations(theta, index).error, _SMALL))
-    fitted = np.repeat((np.arange(n) < posterior.until[index])[:, None], channels, 1)
-    return _Shown(
-        np.where(counted, error / deviation, 0.0).ravel(),
-        np.stack(by_unknown, 1),
-        np.stack(by_shape, 1),
-        (fitted & counted).ravel(),
-        (~fitted & counted).ravel(),
-    )
+    return _Shown(ours(error), np.stack(by_unknown, 1), np.stack(by_shape, 1))
 
 
-def _regressed(columns: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, int]:
-    """Least squares, and how many of the columns are told apart."""
+def _regressed(columns: np.ndarray, wanted: np.ndarray) -> tuple[float, int]:
+    """Sum of squares that least squares leave, and how many of the columns are told apart."""
     scale = np.linalg.norm(columns, axis=0)
     scale = np.where(scale > 0, scale, 1.0)
     found, _, rank, _ = np.linalg.lstsq(columns / scale, wanted, rcond=_APART)
-    return found / scale, int(rank)
+    return float(np.sum((wanted - columns @ (found / scale)) ** 2)), int(rank)
