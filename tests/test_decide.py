@@ -65,8 +65,8 @@ def test_no_cause_is_named_that_is_hardly_likelier_than_one_of_another_family_an
         (15.0, 0.0, "cause"),
         (30.0, 0.0, "cause"),
         (60.0, 0.0, "undecided"),
-        (60.0, 0.002, "cause"),
-        (600.0, 0.002, "undecided"),
+        (600.0, 0.002, "cause"),
+        (900.0, 0.002, "undecided"),
     ],
 )
 def test_no_cause_is_named_beside_which_other_shapes_would_explain_much(nats: float, left: float, verdict: str):

@@ -18,7 +18,7 @@ NOISE = 0.01
 
 
 def told(law: Callable[[float, float], float], channel: str, seed: int) -> float:
-    """Nats beside a model with a cubic spring, its values refitted, where the law beside spring and dashpot is `law`."""
+    """Nats beside a refitted model with a cubic spring, where the law beside spring and dashpot is `law`."""
     rng = np.random.default_rng(seed)
     omegas, phases = rng.uniform(0.5, 7.0, 12), rng.uniform(0, 2 * np.pi, 12)
 

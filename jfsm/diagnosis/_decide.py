@@ -35,9 +35,10 @@ _ALMOST_ALL = 0.95
 """A law that explains this share of the excess along an imposed motion stands, whatever a map makes of the rest."""
 _UNFIT = 20.0
 """Nats that laws of other shapes must gain beside a cause, beyond chance, for it not to be named,"""
-_UNFIT_SHARE, _UNFIT_OF_WHITE = 0.05, 0.005
-"""and share of those that it gains itself (the second of two effects: beside the first); the latter where its
-innovations are white, so that all else is right."""
+_UNFIT_SHARE = {1: 0.1, 2: 0.05}
+"""and share of the nats that its last effect gains, of one effect or two: two together stand for many a single law."""
+_UNFIT_OF_WHITE = 0.005
+"""The same where innovations are white: all else is right then."""
 _WHITE = 0.1
 _SCALE = 0.5
 _LOOKS = (10.0, 40.0)
@@ -231,7 +232,7 @@ def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
 
 def _unfit(winner: Trial, gained: float, nats: float) -> bool:
     """Whether laws of other shapes would gain too much beside the winner, whose last effect gained so many nats."""
-    return nats > max(_UNFIT, (_UNFIT_OF_WHITE if white(winner) else _UNFIT_SHARE) * gained)
+    return nats > max(_UNFIT, (_UNFIT_OF_WHITE if white(winner) else _UNFIT_SHARE[len(winner.effects)]) * gained)
 
 
 def _verdict(given: Trial, refitted: Trial, winner: Trial, tried: Sequence[Trial], mapped: Trial | None) -> str:
