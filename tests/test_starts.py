@@ -1,5 +1,7 @@
 """Where a search begins: shapes that explain the missing force, for one law and for two."""
 
+from dataclasses import replace
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -47,6 +49,16 @@ def test_two_laws_are_placed_beside_each_other():
     (best,) = starts(wrong, prepare(r, wrong))
     assert best.values()["cubic_stiffness@0-1.k3"] == pytest.approx(3.0, rel=0.3)
     assert best.values()["quadratic_damping@0-1.c2"] == pytest.approx(0.5, rel=0.5)
+
+
+def test_no_law_is_placed_on_a_force_that_ran_away():
+    law = jfsm.CubicStiffness(0.1, at=(0, 1))
+    nuisances = prepare(record(lambda x, v: 3.0 * x**3), MODEL)
+    latent = missing_force(MODEL, nuisances)
+    assert place(law, latent, MODEL, scale_of(nuisances, MODEL), nuisances)
+    with np.errstate(over="ignore"):
+        far = replace(latent, force=latent.force * 1e300)
+    assert place(law, far, MODEL, scale_of(nuisances, MODEL), nuisances) == []
 
 
 def test_a_side_and_an_origin_of_time_are_no_matter_of_search():

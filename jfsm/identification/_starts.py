@@ -34,6 +34,8 @@ _CORRELATED = 20.0
 """Samples of a smoothed force that count as one."""
 _RUN_AWAY = 1e9
 """Force of a hidden state that its steps could not follow, as a multiple of the missing one."""
+_NO_FORCE = 1e100
+"""Missing force [N] that is none."""
 _LEAST = 1e-4
 """Size of an effect, as a share of the elastic force, below which it is no start."""
 _ALMOST_NONE = 1e-6
@@ -159,7 +161,8 @@ def place(
 ) -> list[Placed]:
     """Terms of `law`'s class at its place, best first, that explain a missing force beside `others`.
 
-    `sign` asks for that sign of the first number; a side stays as it is unless `sides` are to be tried.
+    `sign` asks for that sign of the first number; a side stays as it is unless `sides` are to be tried. None are found
+    where the missing force is no number.
     """
     kind, n = type(law), len(latent.force)
     time = jnp.asarray(nuisances.record.time[:n])
@@ -167,6 +170,8 @@ def place(
     # At rest friction is anything within its limits, and all else is noise.
     moves = latent.moves if np.any(latent.moves) else np.ones(n, bool)
     missing = latent.force[moves]
+    if not np.all(np.abs(missing) < _NO_FORCE):
+        return []  # a hidden state of the structure's own runs away along this motion
     spread = np.maximum(missing.std(0), 1e-300)
     rows = _numbers(law, scale, sides)
     forces = np.concatenate([_forces(law, lot, structure, motion, len(chunk)) for chunk, lot in _lots(kind, rows)])
