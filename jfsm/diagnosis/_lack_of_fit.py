@@ -5,12 +5,14 @@ the filter, and the innovations are regressed on what each does to them beside w
 shapes are polynomials of the motion that the hypothesis itself predicts, so that no noise of the readings is in them.
 """
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from jax import Array
 
+from .._threads import side_by_side
 from ..dynamics._plant import direction
 from ..identification import Nuisances, Posterior, missing_force
 from ._trial import Trial, free_run
@@ -68,7 +70,7 @@ def _shapes(trial: Trial, posterior: Posterior, links: Sequence[tuple[int, int]]
     spread = np.maximum(every.std(1, keepdims=True), 1e-300)
     d, w = np.clip((every - every.mean(1, keepdims=True)) / spread, -_FARTHEST, _FARTHEST)
     found = np.stack([d**i * w**j for i in range(_DEGREE + 1) for j in range(_DEGREE + 1 - i)])
-    found = found / np.sqrt(np.mean(found**2, 1, keepdims=True))
+    found = found / np.maximum(np.sqrt(np.mean(found**2, 1, keepdims=True)), 1e-300)
     forces = np.concatenate([found[:, :, i, None] * row for i, row in enumerate(rows)])
     return np.split(forces, np.cumsum([motion.shape[1] for motion in motions])[:-1], 1)
 
@@ -86,22 +88,21 @@ def _shown(trial: Trial, posterior: Posterior, index: int, shapes: np.ndarray) -
     def moved(then: Array, change: float) -> np.ndarray:
         return ours(np.asarray(then) - error) / change
 
-    by_unknown = []
-    for k, (u, variance) in enumerate(zip(trial.unknowns, np.diag(trial.covariance), strict=True)):
-        if u.path.startswith("noise@") or u.record not in (None, index):
-            by_unknown.append(np.zeros(np.count_nonzero(counted)))
-            continue
-        change = _NUDGE * max(float(np.sqrt(max(variance, 0.0))), 1e-9)
+    def by_unknown(k: int) -> np.ndarray:
+        if trial.unknowns[k].path.startswith("noise@") or trial.unknowns[k].record not in (None, index):
+            return np.zeros(np.count_nonzero(counted))
+        change = _NUDGE * max(math.sqrt(max(trial.covariance[k, k], 0.0)), 1e-9)
         nudged = theta + change * (np.arange(theta.size) == k)
-        by_unknown.append(moved(posterior.innovations(nudged, index).error, change))
-    size = _SMALL * nuisances.elastic_force(trial.structure)
-    by_shape = []
-    for shape in shapes:
+        return moved(posterior.innovations(nudged, index).error, change)
+
+    def by_shape(shape: np.ndarray) -> np.ndarray:
         records = list(posterior.records)
-        records[index] = nuisances.pushed(-size * shape)
+        records[index] = nuisances.pushed(-_SMALL * nuisances.elastic_force(trial.structure) * shape)
         pushed = Posterior(posterior.hypothesis, records, posterior.until)
-        by_shape.append(moved(pushed.innovations(theta, index).error, _SMALL))
-    return _Shown(ours(error), np.stack(by_unknown, 1), np.stack(by_shape, 1))
+        return moved(pushed.innovations(theta, index).error, _SMALL)
+
+    unknowns, forces = side_by_side(by_unknown, range(theta.size)), side_by_side(by_shape, shapes)
+    return _Shown(ours(error), np.stack(list(unknowns), 1), np.stack(list(forces), 1))
 
 
 def _regressed(columns: np.ndarray, wanted: np.ndarray) -> tuple[float, int]:
