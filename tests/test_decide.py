@@ -90,4 +90,10 @@ def test_a_second_effect_is_looked_for_where_more_is_left_than_chance_leaves(lef
     refitted, best = trial(0.0, 1.0), trial(9000.0, left, "coulomb")
     scatter = np.full(2, 5e-4)
     best.prediction = Prediction(best.prediction.error, best.prediction.expected, scatter)
-    assert something_left([refitted, best], refitted, imposed=False) == worth
+    assert something_left([refitted, best], refitted, lambda t: 0.0, imposed=False) == worth
+
+
+@pytest.mark.parametrize(("nats", "worth"), [(400.0, False), (500.0, True)])
+def test_a_second_effect_is_looked_for_where_little_is_left_but_other_shapes_would_explain_much(nats, worth: bool):
+    refitted, best = trial(0.0, 1.0), trial(9000.0, 3e-4, "coulomb")
+    assert something_left([refitted, best], refitted, lambda t: nats, imposed=False) == worth

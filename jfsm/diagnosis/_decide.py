@@ -80,11 +80,15 @@ def white(trial: Trial) -> bool:
     return trial.whiteness < _WHITE and bool(np.all(np.abs(trial.noise[trial.trusted]) < _SCALE))
 
 
-def something_left(trials: Sequence[Trial], refitted: Trial, *, imposed: bool) -> bool:
+def something_left(
+    trials: Sequence[Trial], refitted: Trial, lack_of_fit: Callable[[Trial], float], *, imposed: bool
+) -> bool:
     """Whether the best of them leaves enough for a second effect to be worth a search: what a pair has to gain."""
     best = max(trials, key=lambda t: t.evidence)
-    if adequate(best) or best.prediction.left < NEGLIGIBLE or (imposed and _almost_all(best, refitted)):
+    if adequate(best) or (imposed and _almost_all(best, refitted)):
         return False
+    if best.prediction.left < NEGLIGIBLE:
+        return bool(best.effects) and lack_of_fit(best) > _UNFIT_SHARE[2] * (best.evidence - refitted.evidence)
     return bool(np.all(best.prediction.beyond >= _WORTH_A_SECOND**2 * refitted.prediction.error))
 
 

@@ -3,6 +3,7 @@
 import math
 import secrets
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import jax
 import numpy as np
@@ -107,7 +108,8 @@ def diagnose(
     imposed = records[0].path is not None
     trials, behind = search(tried, model, given, refitted, records, until, steps.next)
     given, refitted, *trials = beside_chance([given, refitted, *trials], model, records, until, key)
-    effects = _beside([given, refitted, *trials], refitted, every, imposed=imposed) if max_causes > 1 else []
+    lack = partial(lack_of_fit, records=records, until=until)
+    effects = _beside([given, refitted, *trials], refitted, every, lack, imposed=imposed) if max_causes > 1 else []
     if effects:
         found = search_pairs(effects, trials, model, refitted, records, until, steps.next)
         every_trial, behind = [given, refitted, *trials, *found.trials], behind + found.behind
@@ -119,7 +121,7 @@ def diagnose(
         refitted,
         trials,
         lambda t: stand_in(t, records, until),
-        lambda t: lack_of_fit(t, records, until),
+        lack,
         periods,
         imposed=imposed,
     )
@@ -156,10 +158,12 @@ def diagnose(
     return assemble(decision, clipped, refitted, tested, model, extended, records, missing, gain, runs)
 
 
-def _beside(alone: list[Trial], refitted: Trial, every: list[Candidate], *, imposed: bool) -> list[Effect]:
+def _beside(
+    alone: list[Trial], refitted: Trial, every: list[Candidate], lack: Callable[[Trial], float], *, imposed: bool
+) -> list[Effect]:
     """Effects that are worth a try beside others, after what single ones leave."""
     effects = [effect for candidate in every for effect in candidate.effects]
-    if something_left(alone, refitted, imposed=imposed):
+    if something_left(alone, refitted, lack, imposed=imposed):
         return effects
     # A gain may hide in own values.
     return [e for e in effects if e.cause.effect in (ForceGain, AccelerationGain)] if strained(alone) else []
