@@ -3,8 +3,8 @@
 A cause must do three things: be more probable than its absence, explain at least half of the power that a refit of the
 model leaves, and do so on every set of samples, held-out ones included. Where the winner leaves nothing but noise, its
 evidence is trusted as it stands; where it does not, evidence counts no more than some tens of independent looks, and
-no cause is more probable than the share of the power that it explains. And no cause is named that fits worse than some
-law of another shape beside it would, by more than the share of what it explains that is forgiven.
+no cause is more probable than the share of the power that it explains. And no cause is named beside which laws of other
+shapes would gain more than a small share of what it gains itself.
 """
 
 import math
@@ -165,12 +165,13 @@ def decide(
         chance = {which: p * kappa[id(winner)] for which, p in chance.items()}
     if verdict == "cause" and chance[id(winner)] < 0.5 and family < 0.8:
         verdict = "undecided"
-    fewer = max(t.evidence for t in (given, refitted, *tried) if len(t.effects) < len(winner.effects) or t is given)
-    if verdict == "cause" and _unfit(winner, winner.evidence - fewer, lack_of_fit(winner)):
-        why[id(winner)], chance[id(winner)] = "explains much of it, but is not of the right shape", 0.0
-        mapped = stand_in(refitted)
-        stands_in = mapped is not None and explained(mapped, refitted) >= GATE
-        verdict, winner = ("unnamed", refitted) if stands_in else ("undecided", winner)
+    if verdict == "cause":
+        fewer = [t.evidence for t in (given, refitted, *tried) if len(t.effects) < len(winner.effects)]
+        if _unfit(winner, winner.evidence - max(fewer), lack_of_fit(winner)):
+            why[id(winner)], chance[id(winner)] = "explains much of it, but is not of the right shape", 0.0
+            mapped = stand_in(refitted)
+            stands_in = mapped is not None and explained(mapped, refitted) >= GATE
+            verdict, winner = ("unnamed", refitted) if stands_in else ("undecided", winner)
     if verdict == "consistent":
         winner = given
     elif verdict == "unnamed" and mapped is not None:

@@ -116,15 +116,8 @@ def diagnose(
         given, refitted, *trials = beside_chance(every_trial, model, records, until, key)
     steps.next("the verdict")
     periods = sum(n.record.duration for n in records) * records[0].omega / (2 * math.pi)
-    decision = decide(
-        given,
-        refitted,
-        trials,
-        lambda t: stand_in(t, records, until),
-        lack,
-        periods,
-        imposed=imposed,
-    )
+    mapped = partial(stand_in, records=records, until=until)
+    decision = decide(given, refitted, trials, mapped, lack, periods, imposed=imposed)
     if clipped:
         decision = beside_clipping(decision, clipped, refitted)
     first = records[0]
