@@ -135,21 +135,20 @@ def _noise(
     total = {c: 0.0 for c in record.answers}
     for _ in range(_DRAWS):
         # The extended model's own run stands for the truth; fresh noise on what was measured, and all steps again.
-        noisy = {
-            c: (run[c] if c in run else y) + levels.get(c, 0.0) * rng.standard_normal(len(record))
-            for c, y in record.channels.items()
-        }
-        again = _run(model, remeasured(record, noisy), window, reconstruction)
+        truth = {c: run[c] if c in run else y for c, y in record.channels.items()}
+        again = _run(model, remeasured(record, truth, levels, rng), window, reconstruction)
         for c in total:
             total[c] += float(np.mean((again[c] - run[c])[_counted(record, window)] ** 2)) / _DRAWS
     return {c: total[c] + levels.get(c, 0.0) ** 2 for c in total}
 
 
-def remeasured(record: Record, channels: Mapping[tuple, np.ndarray]) -> Record:
-    """The record with other samples in its channels."""
+def remeasured(
+    record: Record, truth: Mapping[tuple, np.ndarray], levels: Mapping[tuple, float], rng: np.random.Generator
+) -> Record:
+    """The record, had its channels measured this, with fresh noise of these standard deviations."""
     kinds: dict[str, Any] = {}
-    for (kind, j), y in channels.items():
-        kinds.setdefault(kind, {})[j] = y
+    for (kind, j), y in truth.items():
+        kinds.setdefault(kind, {})[j] = y + levels.get((kind, j), 0.0) * rng.standard_normal(y.size)
     return Record(
         record.time, **kinds, base_acceleration=record.base_acceleration, at_rest=record.at_rest, drive=record.drive
     )  # pyright: ignore

@@ -76,6 +76,7 @@ def _shapes(trial: Trial, posterior: Posterior, links: Sequence[tuple[int, int]]
 
 
 def _shown(trial: Trial, posterior: Posterior, index: int, shapes: np.ndarray) -> _Shown:
+    """What each unknown and each shape (shapes, n, dof) does to record `index`."""
     nuisances, theta = posterior.records[index], trial.theta
     base = posterior.innovations(theta, index)
     error, deviation = np.asarray(base.error), np.sqrt(np.maximum(base.variance, 1e-300))
@@ -96,10 +97,8 @@ def _shown(trial: Trial, posterior: Posterior, index: int, shapes: np.ndarray) -
         return moved(posterior.innovations(nudged, index).error, change)
 
     def by_shape(shape: np.ndarray) -> np.ndarray:
-        records = list(posterior.records)
-        records[index] = nuisances.pushed(-_SMALL * nuisances.elastic_force(trial.structure) * shape)
-        pushed = Posterior(posterior.hypothesis, records, posterior.until)
-        return moved(pushed.innovations(theta, index).error, _SMALL)
+        push = -_SMALL * nuisances.elastic_force(trial.structure) * shape
+        return moved(posterior.innovations(theta, index, push=push).error, _SMALL)
 
     unknowns, forces = side_by_side(by_unknown, range(theta.size)), side_by_side(by_shape, shapes)
     return _Shown(ours(error), np.stack(list(unknowns), 1), np.stack(list(forces), 1))

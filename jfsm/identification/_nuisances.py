@@ -124,15 +124,15 @@ class Nuisances:
         n, r = self.samples, self.readings
         return replace(self, readings=_padded(values, np.asarray(r.use)[:n], np.asarray(r.variance)))
 
-    def pushed(self, force: np.ndarray) -> "Nuisances":
-        """The same record, had another force (n, dof) driven it as well."""
+    def pushed(self, force: np.ndarray) -> Fine:
+        """What drives the record, and another force (n, dof) as well."""
         fine = self.fine
         assert isinstance(fine, Fine)
         samples, halves, dof = fine.force.shape
         places = (np.arange(samples)[:, None] + np.linspace(0.0, 1.0, halves)[None, :]).ravel()
         between = [np.interp(places, np.arange(len(force)), force[:, j]) for j in range(dof)]
         added = np.stack(between, 1).reshape(samples, halves, dof)
-        return replace(self, fine=Fine(fine.force + jnp.asarray(added), fine.base, fine.time, fine.step))
+        return Fine(fine.force + jnp.asarray(added), fine.base, fine.time, fine.step)
 
     def resolving(self, structures: Sequence[Structure]) -> "Nuisances":
         """The same record with steps short enough for all of these structures."""

@@ -136,13 +136,14 @@ class Posterior:
         index: int = 0,
         *,
         use: np.ndarray | None = None,
+        push: np.ndarray | None = None,
         noise_scales: bool = True,
         slack: float = 0.0,
     ) -> Innovations:
         """Innovations of record `index` at `theta` (unknowns,) of a hypothesis with one start.
 
-        `use` (n, channels) masks readings, `slack` forgives unmodelled force as in `evaluate`. Without `noise_scales`
-        the channels' noise is taken at its floor.
+        `use` (n, channels) masks readings, `push` (n, dof) is a force that drives it as well, `slack` forgives
+        unmodelled force as in `evaluate`. Without `noise_scales` the channels' noise is taken at its floor.
         """
         nuisances, (plant, maps, mine) = self.records[index], self._parts[index]
         inner = np.zeros((len(self._pick), maps.unit.shape[1]))
@@ -163,7 +164,7 @@ class Posterior:
             maps,
             jnp.asarray(inner),
             nuisances.show,
-            nuisances.fine,
+            nuisances.fine if push is None else nuisances.pushed(push),
             readings,
             slackened(nuisances, slack),
             _doubt(plant, nuisances),
