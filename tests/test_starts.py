@@ -51,6 +51,20 @@ def test_two_laws_are_placed_beside_each_other():
     assert best.values()["quadratic_damping@0-1.c2"] == pytest.approx(0.5, rel=0.5)
 
 
+def test_a_buckled_spring_is_placed_although_the_motion_stays_small_within_one_well():
+    def decay(t, y):
+        return [y[1], -9.0 * y[0] - 0.3 * y[1] + 15.0 * y[0] - 6.0 * y[0] ** 3]
+
+    x = solve_ivp(decay, (0, T[-1]), [1.25, 0.0], t_eval=T, rtol=1e-9, atol=1e-12).y[0]
+    assert np.std(x) < 0.05 * np.mean(x)
+    r = jfsm.Record(T, displacement=x + 0.01 * np.std(x) * np.random.default_rng(5).standard_normal(T.size))
+    wrong = MODEL + jfsm.DoubleWell(1.0, 1.0, at=(0, 1))
+    found = starts(wrong, prepare(r, wrong))[0].values()
+    assert found["double_well@0-1.k_neg"] > 9.0
+    middle = np.sqrt((found["double_well@0-1.k_neg"] - 9.0) / found["double_well@0-1.k3"])
+    assert middle == pytest.approx(1.0, rel=0.3)
+
+
 def test_no_law_is_placed_on_a_force_that_ran_away():
     law = jfsm.CubicStiffness(0.1, at=(0, 1))
     nuisances = prepare(record(lambda x, v: 3.0 * x**3), MODEL)

@@ -76,4 +76,5 @@ class DoubleWell(AbstractTerm):
     @classmethod
     def shapes(cls, scale):
         k, x = scale.force / scale.length, scale.length
-        return [{"k_neg": 1.3 * k, "k3": ratio * k / x**2} for ratio in (0.15, 0.3, 0.6, 1.2)]
+        # From motion over the hill to one within a well that is thirty times as far from the centre as it is wide.
+        return [{"k_neg": 1.3 * k, "k3": 1.2 * k / x**2 / 2**i} for i in range(13)]
