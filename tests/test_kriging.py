@@ -307,7 +307,7 @@ def test_intervals_of_95_per_cent_hold_the_truth_as_often_on_functions_drawn_fro
     root = np.linalg.cholesky(Gaussian().between(both, both, jnp.asarray(LENGTH)) + 1e-10 * np.eye(len(both)))
     draws = root @ np.random.default_rng(8).normal(size=(len(both), 1500))
     readings_of_all = draws[:80] + 0.1 * np.random.default_rng(9).normal(size=(80, 1500))
-    force_map = Kriging.fit(states, readings_of_all, shared=True, **GIVEN)  # every draw an output
+    force_map = Kriging.fit(states, readings_of_all, outputs="shared", **GIVEN)  # every draw an output
     inside = np.abs(force_map.evaluate(queries) - draws[80:]) < 1.96 * force_map.evaluate_std(queries)
     assert 0.94 < np.mean(inside) < 0.96
 
@@ -374,7 +374,7 @@ def test_maps_drawn_from_the_posterior_scatter_as_the_standard_error_says(fitted
 
 def test_outputs_have_hyper_parameters_of_their_own_or_share_them(fitted):
     force = np.stack([FORCE, 1e3 * STATES[:, 0] ** 2 + 0.001 * FORCE], axis=1)
-    own, shared = Kriging.fit(STATES, force), Kriging.fit(STATES, force, shared=True)
+    own, shared = Kriging.fit(STATES, force), Kriging.fit(STATES, force, outputs="shared")
     assert own.length_scale.shape == (2, 2)
     assert shared.length_scale.shape == (2,)
     assert own.process_variance.shape == shared.process_variance.shape == (2,)
@@ -386,6 +386,18 @@ def test_outputs_have_hyper_parameters_of_their_own_or_share_them(fitted):
         assert force_map.evaluate(QUERIES).shape == (12, 2)
         assert force_map.evaluate(np.zeros((0, 2))).shape == (0, 2)
         assert force_map.trend_coefficients.shape == (6, 2)
+
+
+@pytest.mark.parametrize("points", [2000, 100])
+def test_a_force_that_is_known_to_vanish_at_rest_does(fitted, points):
+    rest = np.zeros(2)
+    assert abs(fitted(rest)) > 1e-3
+    held = Kriging.fit(STATES, FORCE, zero_at_rest=True, points=points)
+    assert abs(held(rest)) < 2e-4
+    assert held.std(rest) < 1e-3 < fitted.std(rest)
+    np.testing.assert_allclose(held.evaluate(QUERIES), fitted.evaluate(QUERIES), atol=0.05)
+    weighed = Kriging.fit(STATES, FORCE, zero_at_rest=True, nugget=np.full(150, 0.01), state_std=0.01 * UNIT)
+    assert abs(weighed(rest)) < 2e-4
 
 
 def test_many_states_at_once_give_what_single_calls_give(fitted):

@@ -185,7 +185,7 @@ SAVED = {
         STATES[:60], TWO_OUTPUTS[:60], PowerExponential(1.5), "pure quadratic", length_scale=UNITS, nugget=0.1
     ),
     "kriging, shared": lambda: Kriging.fit(
-        STATES[:60], TWO_OUTPUTS[:60], Matern52(), length_scale=UNITS, nugget=0.1, shared=True
+        STATES[:60], TWO_OUTPUTS[:60], Matern52(), length_scale=UNITS, nugget=0.1, outputs="shared"
     ),
     "table": lambda: tabulate(RKPM.fit(STATES, quadratic(STATES), order=2), nodes=12),
 }

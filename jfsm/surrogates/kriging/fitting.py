@@ -22,6 +22,9 @@ EXPLAINED = 1e-12
 CELLS = 1000
 """Cells of merged readings: at 5 % noise, 600 and 1500 cells give the errors of 1e4 and 1e5 samples within a tenth."""
 
+EXACT = 1e-6
+"""Noise variance of a reading that is known, relative to that of the others."""
+
 PASSES = 3
 """How often readings are weighed by the slope of the map under noisy states."""
 
@@ -90,9 +93,10 @@ class Part(NamedTuple):
         nugget: Any,
         noise_variance: Any,
         state_std: Any,
-        shared: bool,
+        together: bool,
+        zero_at_rest: bool,
     ) -> list["Part"]:
-        """One part for all columns of the force, or one for each.
+        """One part for all columns of the force together, or one for each.
 
         Raises
         ------
@@ -105,9 +109,9 @@ class Part(NamedTuple):
             raise ValueError(f"`nugget` must be one number or one per reading ({n}); got shape {relative.shape}.")
         noise = None
         if noise_variance is not None:
-            noise = _noise(noise_variance, nugget, n, outputs, shared)
+            noise = _noise(noise_variance, nugget, n, outputs, together)
         spread = None if state_std is None else _state_variance(state_std, states)
-        groups = [slice(None)] if shared else [slice(k, k + 1) for k in range(outputs)]
+        groups = [slice(None)] if together else [slice(k, k + 1) for k in range(outputs)]
         parts = []
         for group in groups:
             level = None
@@ -115,8 +119,21 @@ class Part(NamedTuple):
                 column = noise[:, group][:, 0]
                 level = float(column.mean())
                 relative = column / level
-            parts.append(cls(Checked(states, force[:, group], relative), level, spread))
+            part = cls(Checked(states, force[:, group], relative), level, spread)
+            parts.append(part._with_rest() if zero_at_rest else part)
         return parts
+
+    def _with_rest(self) -> "Part":
+        """The part with one reading more, of no force at rest, that is hardly in doubt."""
+        states, force, relative = self.readings
+        spread = self.state_variance
+        more = Checked(_with_row(states), _with_row(force), np.append(relative, EXACT * np.min(relative)))
+        return self._replace(readings=more, state_variance=None if spread is None else _with_row(spread))
+
+
+def _with_row(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rows, and one of zeros."""
+    return np.concatenate([rows, np.zeros_like(rows[:1])])
 
 
 def _noise(noise_variance: Any, nugget: Any, n: int, outputs: int, shared: bool) -> NDArray[np.float64]:
@@ -128,7 +145,7 @@ def _noise(noise_variance: Any, nugget: Any, n: int, outputs: int, shared: bool)
         raise ValueError(f"`noise_variance` must be positive; got {noise.min():g}. For exact readings, `nugget=0`.")
     if noise.shape not in ((), (n,), (n, outputs)) or shared and noise.ndim == 2:
         raise ValueError(
-            f"`noise_variance` must be one number, one per reading ({n}), or (with `shared=False`) of shape "
+            f"`noise_variance` must be one number, one per reading ({n}), or (with `outputs='separate'`) of shape "
             f"({n}, {outputs}); got shape {noise.shape}."
         )
     return np.broadcast_to(noise if noise.ndim == 2 else noise.reshape(-1, 1), (n, outputs))
@@ -149,17 +166,34 @@ class Fitted(NamedTuple):
 
     posterior: Posterior
     negative_log_likelihood: float
+    log_parameters: NDArray[np.float64]
     remarks: tuple[str, ...]
 
 
-def fit_part(part: Part, options: Options) -> Fitted:
-    """Field of largest likelihood for outputs that share their hyper-parameters."""
-    remarks: list[str] = []
+def merged(part: Part, options: Options) -> tuple[Part, tuple[str, ...]]:
+    """The part, its readings merged where they are too many, and words on it.
+
+    Raises
+    ------
+    MemoryError
+        If the likelihood of so many points would not fit into memory.
+    """
     given = len(part.readings.states)
-    if given > options.points:
-        part = _merged(part, min(options.points, CELLS))
-        remarks.append(f"{given} readings were merged to means over {len(part.readings.states)} cells of a grid.")
-    check_memory(len(part.readings.states))
+    if given <= options.points:
+        check_memory(given)
+        return part, ()
+    part = _merged(part, min(options.points, CELLS))
+    left = len(part.readings.states)
+    check_memory(left)
+    return part, (f"{given} readings were merged to means over {left} cells of a grid.",)
+
+
+def fit_part(part: Part, options: Options, start: NDArray[np.float64] | None = None) -> Fitted:
+    """Field of largest likelihood for outputs that share their hyper-parameters.
+
+    `start` holds the logarithms of length scales and nugget from which alone the search sets out.
+    """
+    part, remarks = merged(part, options)
     trend, basis = trend_basis(options.trend, jnp.asarray(part.readings.states))
     known = part.noise_variance
     known = None if known is None else jnp.full(part.readings.force.shape[1], known)
@@ -172,15 +206,15 @@ def fit_part(part: Part, options: Options) -> Fitted:
         noise_variance=known,
         restricted=options.restricted,
     )
-    optimum = _search(readings, options)
+    optimum = _search(readings, options, start)
     posterior = condition(readings, trend, jnp.asarray(optimum.log_parameters), jnp.asarray(optimum.jitter))
     for _ in range(PASSES if part.state_variance is not None else 0):
         readings = _weighed(readings, posterior, part.readings.relative_noise, part.state_variance)
         optimum = _search(readings, options, start=optimum.log_parameters)
         posterior = condition(readings, trend, jnp.asarray(optimum.log_parameters), jnp.asarray(optimum.jitter))
     if optimum.jitter > 0.0:
-        remarks.append(f"A jitter of {optimum.jitter:g} was added to the diagonal of R to keep it positive definite.")
-    return Fitted(posterior, optimum.value, (*remarks, *optimum.remarks))
+        remarks += (f"A jitter of {optimum.jitter:g} was added to the diagonal of R to keep it positive definite.",)
+    return Fitted(posterior, optimum.value, optimum.log_parameters, (*remarks, *optimum.remarks))
 
 
 def _merged(part: Part, points: int) -> Part:

@@ -17,6 +17,7 @@ from .._blocks import padded_blocks
 from .._map import AbstractForceStateMap
 from .._readings import reach_of, within
 from ..rkpm.basis import first_derivatives
+from .coregionalisation import fit_mixed
 from .correlations import AbstractCorrelation, Gaussian
 from .fitting import Options, Part, fit_part
 from .leave_one_out import LeaveOneOut
@@ -28,6 +29,8 @@ from .trend import PolynomialTrend, as_trend, trend_basis
 
 POINTS = 2000
 """Readings of an exact fit unless asked otherwise; one evaluation of likelihood and gradient takes half a second."""
+
+OUTPUTS = "separate", "shared", "coregionalised"
 
 LARGEST_WORK = 2**22
 """States × points in flight at once: 32 MiB a matrix."""
@@ -45,10 +48,12 @@ class Kriging(AbstractForceStateMap):
     """
 
     parts: tuple[Posterior, ...]
-    """One for all outputs where they share their hyper-parameters, else one per output."""
+    """One for all outputs where they share their hyper-parameters, else one per output, or per field of a mixture."""
     optima: Float[Array, " parts"]
     reach: Float[Array, ""]
     """Distance to the nearest point, in standard deviations of the states, within which a state counts as visited."""
+    mixing: Float[Array, "forces fields"]
+    """What each output is made of: of itself, unless outputs are coregionalised."""
     vector: bool = eqx.field(static=True)
     remarks: tuple[str, ...] = eqx.field(static=True)
     """What the fit ran into, in words: bounds, jitter, readings merged."""
@@ -66,7 +71,8 @@ class Kriging(AbstractForceStateMap):
         noise_variance: Any = None,
         state_std: Any = None,
         restricted: bool = False,
-        shared: bool = False,
+        outputs: Literal["separate", "shared", "coregionalised"] = "separate",
+        zero_at_rest: bool = False,
         points: int = POINTS,
     ) -> "Kriging":
         """Map of largest likelihood through readings of the restoring force.
@@ -86,15 +92,21 @@ class Kriging(AbstractForceStateMap):
         length_scale : (dim,) array, optional
             Kept instead of estimated, in the units of the columns.
         noise_variance : float, (n,) or (n, outputs) array, optional
-            Noise variance of the readings [N²] where it is known; in place of `nugget`.
+            Noise variance of the readings [N²] where it is known; in place of `nugget`. Not for
+            coregionalised outputs.
         state_std : (dim,) or (n, dim) array, optional
             Standard deviation of noise in the states themselves, in the units of the columns. Each reading then gets
             the noise that it makes through the slope of the map, in three passes. It mends weights and error bars, not
             the flattening that noisy inputs cause: smooth the motion first (`jfsm.estimate_motion`).
         restricted : bool
             Restricted likelihood, which allows for the trend coefficients having been estimated.
-        shared : bool
-            Whether all outputs have the same length scales and nugget; process variances are always their own.
+        outputs : "separate", "shared" or "coregionalised"
+            Separate outputs have length scales and a nugget each; shared, they have these in common and variances of
+            their own. Coregionalised, every output is a mixture of as many independent fields, with length scales and
+            a nugget each: right where forces or noise of several outputs go together (Goovaerts 1997, the linear model
+            of coregionalisation). The force itself changes little, its joint distribution much.
+        zero_at_rest : bool
+            Whether the force is known to be zero where all states are zero: one more reading, hardly in doubt, says so.
         points : int
             Largest number of points of an exact fit, whose time grows like its cube and memory like its square. More
             readings are first merged to means over the cells of a grid, 1000 at most, which count by the number of
@@ -118,15 +130,29 @@ class Kriging(AbstractForceStateMap):
         options = Options.checked(
             _correlation(correlation), trend, nugget, length_scale, restricted, points, columns=states.shape[1]
         )
-        parts = Part.of(states, columns, nugget, noise_variance, state_std, shared)
-        fitted = [fit_part(part, options) for part in parts]
+        if outputs not in OUTPUTS:
+            raise ValueError(f"`outputs` must be one of {', '.join(map(repr, OUTPUTS))}; got {outputs!r}.")
+        mixed = outputs == "coregionalised"
+        if mixed and noise_variance is not None:
+            raise ValueError(
+                "`noise_variance` must be left out where outputs are coregionalised: their noise is mixed."
+            )
+        together = mixed or outputs == "shared"
+        parts = Part.of(states, columns, nugget, noise_variance, state_std, together, zero_at_rest)
+        if mixed:
+            fitted, mixing, optima = fit_mixed(parts[0], options)
+        else:
+            fitted, mixing = [fit_part(part, options) for part in parts], np.eye(columns.shape[1])
+            optima = [one.negative_log_likelihood for one in fitted]
+        one_of = "Field" if mixed else "Output"
         remarks = tuple(
-            f"Output {k}: {remark}" if len(fitted) > 1 else remark
+            f"{one_of} {k}: {remark}" if len(fitted) > 1 else remark
             for k, one in enumerate(fitted)
             for remark in one.remarks
         )
-        optima = jnp.asarray([one.negative_log_likelihood for one in fitted])
-        return cls(tuple(one.posterior for one in fitted), optima, _reach(fitted[0].posterior), vector, remarks)
+        posteriors = tuple(one.posterior for one in fitted)
+        optima, mixing = jnp.asarray(optima), jnp.asarray(mixing)
+        return cls(posteriors, optima, _reach(posteriors[0]), mixing, vector, remarks)
 
     @staticmethod
     def negative_log_likelihood(
@@ -176,12 +202,12 @@ class Kriging(AbstractForceStateMap):
 
     @property
     def length_scale(self) -> Float[Array, "*parts dim"]:
-        """Length scales in the units of the columns; one row per output unless they are shared."""
+        """Length scales in the units of the columns; one row per output or field unless they are shared."""
         return self._per_part("length_scale")
 
     @property
     def nugget(self) -> Float[Array, "*parts"]:
-        """Noise variance of a reading over the process variance; one per output unless they are shared."""
+        """Noise variance of a reading over the process variance; one per output or field unless they are shared."""
         return self._per_part("nugget")
 
     @property
@@ -192,12 +218,12 @@ class Kriging(AbstractForceStateMap):
     @property
     def process_variance(self) -> Float[Array, "*outputs"]:
         """σ² of eq. 66 [N²]; over n - p where the likelihood is restricted."""
-        return self._joined([part.process_variance for part in self.parts])
+        return self._joined([part.process_variance for part in self.parts], 2)
 
     @property
     def noise_variance(self) -> Float[Array, "*outputs"]:
         """Noise variance of a reading [N²]: nugget times process variance."""
-        return self._joined([part.nugget * part.process_variance for part in self.parts])
+        return self._joined([part.nugget * part.process_variance for part in self.parts], 2)
 
     @property
     def log_likelihood(self) -> Float[Array, ""]:
@@ -275,7 +301,7 @@ class Kriging(AbstractForceStateMap):
     def leave_one_out(self) -> LeaveOneOut:
         """Every reading (or mean of merged readings) predicted from all others, in closed form."""
         found = [left_out(part) for part in self.parts]
-        residual, std = (self._joined([one[i] for one in found]) for i in (0, 1))
+        residual, std = self._joined([one[0] for one in found]), self._joined_std([one[1] for one in found])
         return LeaveOneOut(np.asarray(residual), np.asarray(std))
 
     def sample(self, states: Float[ArrayLike, "q dim"], count: int, key: Array) -> Float[Array, "count q *outputs"]:
@@ -289,12 +315,16 @@ class Kriging(AbstractForceStateMap):
         return self._joined([derivatives_at(part, states, orders) for part in self.parts])
 
     def _standard_errors(self, states: Float[Array, "q dim"], orders: Orders) -> Array:
-        return self._joined([standard_errors_at(part, states, orders) for part in self.parts])
+        return self._joined_std([standard_errors_at(part, states, orders) for part in self.parts])
 
-    def _joined(self, parts: list[Array]) -> Array:
-        """All outputs in the last axis, or none where the force was one column."""
+    def _joined(self, parts: list[Array], power: int = 1) -> Array:
+        """All outputs in the last axis, or none where the force was one column; `power` is 2 for variances."""
         joined = parts[0] if len(parts) == 1 else jnp.concatenate(parts, axis=-1)
+        joined = joined @ (self.mixing**power).T
         return joined if self.vector else joined[..., 0]
+
+    def _joined_std(self, parts: list[Array]) -> Array:
+        return jnp.sqrt(self._joined([one**2 for one in parts], 2))
 
     def _per_part(self, name: str) -> Array:
         values = [getattr(part, name) for part in self.parts]
