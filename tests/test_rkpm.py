@@ -318,6 +318,17 @@ def test_ill_conditioned_neighbourhoods_are_solved_again_exactly():
     np.testing.assert_allclose(force_map.evaluate(corners), all_monomials(corners, 3), rtol=0, atol=1e-8)
 
 
+def test_many_derivatives_of_a_large_basis_need_no_more_than_a_moment():
+    """XLA once waited for ever on 64 neighbourhoods of 225 nodes, 28 monomials, 6 derivatives and an exact solve."""
+    states, queries = scattered(1000, 2, seed=4), scattered(64, 2, seed=5) * 0.9
+    force_map = RKPM.fit(states, all_monomials(states, 6)[:, 12:14], order=6, neighbours=56)
+    tree, orders = many.search_tree(force_map.nodes), ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+    targets = derivative_targets(orders, 6)
+    exact, _ = many._by_factorisation(tree, force_map.nodes, force_map.rule, queries, targets)
+    truth = [[monomial_derivative(queries, e, o) for e in multi_indices(2, 6)[12:14]] for o in orders]
+    np.testing.assert_allclose(exact, np.transpose(truth, (2, 0, 1)), rtol=0, atol=1e-6)
+
+
 def test_a_thousand_states_that_need_factorisation_are_no_more_than_a_hundred():
     states = trajectory()
     force_map = RKPM.fit(states, smooth_force(states), neighbours=80)

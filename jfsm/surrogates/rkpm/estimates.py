@@ -71,13 +71,6 @@ def basis_at(near: Neighbourhood, scale: Float[Array, " dim"], rule: Rule, state
     )
 
 
-def derivatives_at(
-    local: LocalBasis, near: Neighbourhood, targets: DerivativeTargets
-) -> Float[Array, "derivatives *outputs"]:
-    """Σ θ_i^β u_i, eqs. 11 and 46, for several derivatives β of one local basis."""
-    return jnp.tensordot(local.shape_functions(targets), near.force, axes=1)
-
-
 def standard_error_at(local: LocalBasis, near: Neighbourhood, targets: DerivativeTargets) -> Float[Array, "*outputs"]:
     """Standard error of the first of `targets`; `RKPM.std` states the formula."""
     force = near.force.reshape(near.force.shape[0], -1)
@@ -85,7 +78,7 @@ def standard_error_at(local: LocalBasis, near: Neighbourhood, targets: Derivativ
     residual = weighted - local.q @ (local.q.T @ weighted)  # √(φc)·e
     freedom = jnp.sum(local.root_weight**2 / near.multiplicity * (1.0 - local.leverage))
     variance = jnp.sum(residual**2, axis=0) / freedom
-    spread = jnp.sum(local.shape_functions(targets)[0] ** 2 / near.multiplicity)
+    spread = jnp.sum(local.shape_functions(targets) ** 2 / near.multiplicity)
     return jnp.sqrt(variance * spread).reshape(near.force.shape[1:])
 
 

@@ -15,7 +15,7 @@ from scipy.spatial import KDTree
 from ..._types import is_traced
 from .._blocks import padded_blocks
 from .basis import DerivativeTargets, basis_size
-from .estimates import SINGULAR, Neighbourhood, Rule, basis_at, degenerate_message, derivatives_at
+from .estimates import SINGULAR, Neighbourhood, Rule, basis_at, degenerate_message
 from .interfaces import regions
 from .moments import moment_estimates
 from .nodes import Nodes
@@ -159,7 +159,7 @@ def _exact_estimates(
 ) -> tuple[Float[Array, "q derivatives outputs"], Float[Array, " q"]]:
     def one(near: Neighbourhood, state: Float[Array, " dim"]) -> tuple[Array, Array]:
         local = basis_at(near, scale, rule, state)
-        return derivatives_at(local, near, targets), local.conditioning
+        return local.derivatives(targets, near.force), local.conditioning
 
     return jax.vmap(one)(around, states)
 

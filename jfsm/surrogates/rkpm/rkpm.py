@@ -17,7 +17,6 @@ from .estimates import (
     Rule,
     basis_at,
     degenerate_message,
-    derivatives_at,
     nearest_nodes,
     standard_error_at,
 )
@@ -247,7 +246,7 @@ def _derivatives(
     force_map: RKPM, state: Float[Array, " dim"], targets: DerivativeTargets
 ) -> Float[Array, "derivatives *outputs"]:
     near, local = _checked_basis(force_map, state)
-    return derivatives_at(local, near, targets)
+    return local.derivatives(targets, near.force)
 
 
 @eqx.filter_jit

@@ -30,10 +30,21 @@ class LocalBasis(NamedTuple):
         """Share of each node's own reading in the fit at that node, 0 to 1."""
         return jnp.sum(self.q**2, axis=1)
 
-    def shape_functions(self, targets: DerivativeTargets) -> Float[Array, "derivatives nodes"]:
-        """θ_i^β of eq. 46 for each target β; ψ_i of eq. 28 where its orders are zero."""
-        scaled = targets.at_origin * targets.per_unit(self.dilation)[:, None]
-        return self.root_weight[None, :] * (self.q @ solve_triangular(self.r, scaled.T, trans=1)).T
+    def derivatives(
+        self, targets: DerivativeTargets, force: Float[Array, "nodes *outputs"]
+    ) -> Float[Array, "derivatives *outputs"]:
+        """Σ θ_i^β u_i, eqs. 11 and 46, for every target β; the polynomial through the readings comes first."""
+        # Many shape functions of one basis are no way to it: XLA's threads wait for ever on a product behind the solve.
+        weighted = self.root_weight[:, None] * force.reshape(force.shape[0], -1)
+        polynomial = solve_triangular(self.r, self.q.T @ weighted)
+        return (self._scaled(targets) @ polynomial).reshape(-1, *force.shape[1:])
+
+    def shape_functions(self, targets: DerivativeTargets) -> Float[Array, " nodes"]:
+        """θ_i^β of eq. 46 for the first target β; ψ_i of eq. 28 where its orders are zero."""
+        return self.root_weight * (self.q @ solve_triangular(self.r, self._scaled(targets)[0], trans=1))
+
+    def _scaled(self, targets: DerivativeTargets) -> Float[Array, "derivatives basis"]:
+        return targets.at_origin * targets.per_unit(self.dilation)[:, None]
 
 
 def safe_root(values: Float[Array, "..."]) -> Float[Array, "..."]:
@@ -124,4 +135,4 @@ def shape_functions(
     """
     local = local_basis(point, nodes, dilation, order=order, window=window)
     beta = (0,) * point.shape[0] if orders is None else orders
-    return local.shape_functions(derivative_targets([beta], order))[0]
+    return local.shape_functions(derivative_targets([beta], order))
