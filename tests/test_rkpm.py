@@ -338,6 +338,19 @@ def test_a_thousand_states_that_need_factorisation_are_no_more_than_a_hundred():
     np.testing.assert_allclose(many_[:100], few, rtol=1e-9)
 
 
+def test_a_map_keeps_its_search_tree_as_long_as_it_lives():
+    states = scattered(300, 2)
+    force_map, before = RKPM.fit(states, smooth_force(states)), len(many._TREES)
+    tree = many.search_tree(force_map.nodes)
+    assert many.search_tree(force_map.nodes) is tree
+    same = jax.tree.map(lambda leaf: leaf, force_map)
+    assert many.search_tree(same.nodes) is tree
+    wider = eqx.tree_at(lambda m: m.nodes.scale, force_map, 2.0 * force_map.nodes.scale)
+    np.testing.assert_allclose(many.search_tree(wider.nodes).data, tree.data / 2.0)
+    del wider, same, force_map
+    assert len(many._TREES) == before
+
+
 def test_counts_within_one_power_of_two_share_one_program(monkeypatch):
     states = scattered(300, 2)
     force_map = RKPM.fit(states, smooth_force(states))

@@ -1,7 +1,9 @@
 """Many states: neighbours from a tree on the host, Cholesky where it is safe, QR where it is not."""
 
+import functools
+import weakref
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -129,8 +131,28 @@ def _by_factorisation(
 
 
 def search_tree(nodes: Nodes) -> KDTree:
-    """Tree of the nodes, each column in units of its scale."""
-    return KDTree(np.asarray(nodes.states) / np.asarray(nodes.scale))
+    """Tree of the nodes, each column in units of its scale; it is kept as long as they are."""
+    owners = nodes.states, nodes.scale
+    key = tuple(map(id, owners))
+    kept = _TREES.get(key)
+    if kept is None or any(owner() is not now for owner, now in zip(kept.owners, owners, strict=True)):
+        tree = KDTree(np.asarray(nodes.states) / np.asarray(nodes.scale))
+        forget = functools.partial(_forget, key)
+        kept = _TREES[key] = _Kept(tree, tuple(weakref.ref(owner, forget) for owner in owners))
+    return kept.tree
+
+
+class _Kept(NamedTuple):
+    tree: KDTree
+    owners: tuple[weakref.ref, ...]
+    """The arrays that it was made of: a number of theirs may be another array's later."""
+
+
+_TREES: dict[tuple[int, ...], _Kept] = {}
+
+
+def _forget(key: tuple[int, ...], _: weakref.ref) -> None:
+    _TREES.pop(key, None)
 
 
 def neighbourhoods(
