@@ -22,6 +22,7 @@ from .dynamics import simulate as simulate
 from .dynamics import simulate_many as simulate_many
 from .estimation import Motion as Motion
 from .estimation import RestoringForce as RestoringForce
+from .estimation import estimate_force_map as estimate_force_map
 from .estimation import estimate_motion as estimate_motion
 from .estimation import restoring_force as restoring_force
 from .identification import Fit as Fit

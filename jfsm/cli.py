@@ -265,7 +265,9 @@ def map(
     model: Annotated[Path | None, _option("Map what this model lacks, as TOML; else all of the force.")] = None,
     mass: Annotated[float | None, _option("Mass of a single degree of freedom, without a model.", "KG")] = None,
     at: Annotated[str | None, _option("The link, where the model has several; 0 is ground.", "I-J")] = None,
-    method: Annotated[str, typer.Option(help="What learns the map: rkpm or kriging.")] = "rkpm",
+    method: Annotated[
+        str, typer.Option(help="What learns the map: rkpm, kriging, or joint: kriging with the motion.")
+    ] = "rkpm",
     order: Annotated[int | None, _option("Order of its polynomials; chosen by the readings without it.")] = None,
     out: Annotated[Path | None, _option("Write the map here, as npz.")] = None,
     report: Annotated[Path | None, _option("Write the page here, as HTML.")] = None,

@@ -26,6 +26,7 @@ from jfsm.surrogates import (
     tabulate,
 )
 from jfsm.surrogates.kriging import inverse, kriging, likelihood, readings
+from jfsm.surrogates.kriging.posterior import Posterior
 
 UNIT = np.array([0.02, 3.0])
 """Metres and metres per second, say."""
@@ -357,7 +358,9 @@ def test_noise_in_the_states_widens_the_error_bars_where_the_map_is_steep():
     force = np.asarray(smooth_force(states)) + 0.01 * np.random.default_rng(13).normal(size=300)
     seen = states + std * np.random.default_rng(14).normal(size=(300, 2))
     plain, corrected = Kriging.fit(seen, force), Kriging.fit(seen, force, state_std=std)
-    steep, flat = corrected.parts[0].relative_noise[np.argsort(np.abs(seen[:, 0]))[jnp.array([0, -1])]]
+    (part,) = corrected.parts
+    assert isinstance(part, Posterior)
+    steep, flat = part.relative_noise[np.argsort(np.abs(seen[:, 0]))[jnp.array([0, -1])]]
     assert steep > 2.0 * flat
     assert corrected.log_likelihood > plain.log_likelihood + 5.0
 

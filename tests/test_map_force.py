@@ -51,7 +51,7 @@ def within(cut, axis: str, truth) -> float:
     return float(np.mean(np.abs(force - truth(np.array(cut[axis])))[there] <= half[there]))
 
 
-@pytest.mark.parametrize("method", ["rkpm", "kriging"])
+@pytest.mark.parametrize("method", ["rkpm", "kriging", "joint"])
 def test_all_of_the_force_is_mapped_with_an_honest_band(record, method):
     found = jfsm.map_force(record, mass=1.0, method=method)
     cuts = found.data["curves"]["cuts"]

@@ -10,7 +10,7 @@ import jax
 import numpy as np
 
 from .._types import evenly_taken
-from ..estimation import RestoringForce, restoring_force
+from ..estimation import RestoringForce, estimate_force_map, restoring_force
 from ..records import Record
 from ..structures import Parameter, Structure
 from ..surrogates import RKPM, Discontinuity, Kriging, PolynomialTrend, find_discontinuities
@@ -55,7 +55,8 @@ class MappedForce:
     discontinuities : tuple of Discontinuity
         Lines across which the force jumps or kinks; an RKPM map does not smooth across them.
     error : float
-        Root mean square of the leave-one-out errors, in the unit of the force.
+        Root mean square of the leave-one-out errors, in the unit of the force; of what is left at the readings where
+        map and motion were learned together.
     centre : (2,) array
         State nearest to rest that the record visited: (0, 0) where it could be.
     coefficients : dict of str to Estimate
@@ -109,8 +110,10 @@ def map_force(
     ----------
     record, model, mass, at
         As for `restoring_force`.
-    method : "rkpm" or "kriging"
-        What learns the map.
+    method : "rkpm", "kriging" or "joint"
+        What learns the map. "joint" is kriging together with the motion, by `estimate_force_map`: of all the force on a
+        single mass, and slower, but noise in displacement and velocity does not flatten it, and its intervals know of
+        all noise.
     order : int, optional
         Of an RKPM map the order of its polynomials, 2 or 3 by the readings when None (a map of order 1 cannot be
         simulated); of a kriging map that of its trend, 2 when None.
@@ -130,9 +133,12 @@ def map_force(
     readings as one as the residuals are correlated over: they are multiplied by the root of 1 + 2 Σ ρ_k. Errors of the
     states themselves, which flatten a map, are not in them; a note says where they matter. Nor is what smoothing makes
     of a jump that was not found, as that of dry friction from displacement alone: intervals near it are too narrow.
+    All this is of maps that are learned after the motion, not together with it.
     """
-    if method not in ("rkpm", "kriging"):
-        raise ValueError(f'`method` must be "rkpm" or "kriging"; got {method!r}.')
+    if method not in ("rkpm", "kriging", "joint"):
+        raise ValueError(f'`method` must be "rkpm", "kriging" or "joint"; got {method!r}.')
+    if method == "joint" and mass is None:
+        raise ValueError('`method="joint"` maps all of the force on a single mass: give `mass`, and no model.')
     if order is not None and order < (1 if method == "rkpm" else 0):
         raise ValueError(f"`order` must be an integer of {1 if method == 'rkpm' else 0} or more; got {order!r}.")
     readings = restoring_force(record, model, mass, at)
@@ -143,7 +149,10 @@ def map_force(
         edges = find_discontinuities(states, force)
         sided = ~_torn(states, readings.states_std[taken], edges)
         states, force = states[sided], force[sided]
-        learned = _by_rkpm(states, force, edges, order) if method == "rkpm" else _by_kriging(states, force, order)
+        if method == "joint":
+            learned = _by_joint(record, mass, states, force, order)
+        else:
+            learned = _by_rkpm(states, force, edges, order) if method == "rkpm" else _by_kriging(states, force, order)
         centre, coefficients = _at_centre(learned, states, force, record.units)
         curves = _curves(learned, readings.at, states, force, centre, record.units)
     except RuntimeError as error:  # the map has no value somewhere in the box
@@ -185,13 +194,15 @@ def map_force(
 
 @dataclass(frozen=True)
 class _Learned:
-    """A map, its leave-one-out error, how it came about, and by how much its standard errors are to be multiplied."""
+    """A map, its error, how it came about, by how much its standard errors are to be multiplied, and whether noise in
+    the states flattens it."""
 
     force_map: RKPM | Kriging
     error: float
     words: dict[str, str]
     widening: float
     remarks: tuple[str, ...] = ()
+    flattened: bool = True
 
     def std(self, states: np.ndarray, orders: tuple[int, ...] = (0, 0)) -> np.ndarray:
         """Standard errors of the map or of its derivative at many states."""
@@ -234,14 +245,26 @@ def _by_rkpm(states: np.ndarray, force: np.ndarray, edges: tuple[Discontinuity, 
 def _by_kriging(states: np.ndarray, force: np.ndarray, order: int | None) -> _Learned:
     trend = PolynomialTrend(2 if order is None else order)
     force_map = Kriging.fit(states, force, trend=trend)
+    error = float(force_map.leave_one_out().rms)
+    words = _kriging_words("Kriging", force_map, trend)
+    return _Learned(force_map, error, words, _widening(force_map, states, force), force_map.remarks)
+
+
+def _by_joint(record: Record, mass: float | None, states: np.ndarray, force: np.ndarray, order: int | None) -> _Learned:
+    trend = PolynomialTrend(2 if order is None else order)
+    force_map = estimate_force_map(record, mass, trend=trend)
+    error = float(np.sqrt(np.mean((force - np.asarray(force_map.evaluate(states))) ** 2)))
+    words = _kriging_words("Kriging together with the motion", force_map, trend)
+    return _Learned(force_map, error, words, 1.0, force_map.remarks, flattened=False)
+
+
+def _kriging_words(method: str, force_map: Kriging, trend: PolynomialTrend) -> dict[str, str]:
     lengths = ", ".join(f"{length:.3g}" for length in np.asarray(force_map.length_scale))
-    words = {
-        "method": "Kriging",
+    return {
+        "method": method,
         "order": f"{trend.order} (trend)",
         "support": f"Gaussian correlation, length scales {lengths}",
     }
-    error = float(force_map.leave_one_out().rms)
-    return _Learned(force_map, error, words, _widening(force_map, states, force), force_map.remarks)
 
 
 def _widening(force_map: RKPM | Kriging, states: np.ndarray, force: np.ndarray) -> float:
@@ -327,6 +350,8 @@ def _notes(
     if edges and isinstance(learned.force_map, Kriging):
         yield "Kriging smooths across discontinuities; an RKPM map does not."
     yield from learned.remarks
+    if not learned.flattened:
+        return
     blur = np.median(readings.states_std, axis=0) / states.std(axis=0)
     for kind, blurred in zip(("displacement", "velocity"), blur, strict=True):
         if blurred > _BLURRED:

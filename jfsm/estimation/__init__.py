@@ -5,6 +5,7 @@ from ._filter import ProcessNoise as ProcessNoise
 from ._filter import Readings as Readings
 from ._filter import Start as Start
 from ._filter import innovations as innovations
+from ._force_map import estimate_force_map as estimate_force_map
 from ._latent import Latent as Latent
 from ._latent import latent_force as latent_force
 from ._motion import Motion as Motion

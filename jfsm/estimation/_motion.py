@@ -6,7 +6,7 @@ missing can be told from the others. All its numbers (stiffness, damping, how th
 of the random force, noise of each channel) are the most probable ones of the record.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -135,20 +135,8 @@ def estimate_motion(
                 f"`model` must be given where a degree of freedom is measured by nothing; {j} is not. "
                 "Pass the structure, whose links tell what moves it."
             )
-    return motion_and_smoother(record)[0]
-
-
-def motion_and_smoother(record: Record) -> tuple[Motion, Callable[[Record], Motion]]:
-    """`estimate_motion` of a record without a model, and the same smoother, its numbers kept, for others like it."""
     estimates = [_Estimate.of(Part.of_dof(record, j)) for j in range(1, record.dofs + 1)]
-
-    def again(other: Record) -> Motion:
-        parts = [Part.of_dof(other, j) for j in range(1, record.dofs + 1)]
-        kept = [one.found for one in estimates]
-        found = [_Estimate(part, numbers, *smoothed(part, numbers)) for part, numbers in zip(parts, kept, strict=True)]
-        return _together(other, found, record.dofs)
-
-    return _together(record, estimates, record.dofs), again
+    return _together(record, estimates, record.dofs)
 
 
 def _with_model(record: Record, model: Structure, places: Sequence[Place] | None) -> Motion:

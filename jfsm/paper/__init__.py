@@ -5,6 +5,8 @@ its systems are in `jfsm.systems`. It measured nothing: all its records are simu
 """
 
 from ._cases import smooth_case as smooth_case
+from ._kriging import Finding as Finding
+from ._kriging import findings as findings
 from ._noise import FITS as FITS
 from ._noise import noise_rows as noise_rows
 from ._noise import saturating as saturating

@@ -1,4 +1,4 @@
-"""Section 5: kriging under noise on every channel, after the motion is estimated; coefficients, rest and cycles."""
+"""Section 5: kriging under noise on every channel, estimated with the motion; coefficients, rest and cycles."""
 
 import math
 from collections.abc import Sequence
@@ -6,33 +6,30 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
+import jax
 import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import RectBivariateSpline
 from scipy.stats import t as student
 
-from ..dynamics import Response, simulate
-from ..estimation._motion import Motion, motion_and_smoother
-from ..records import Record, noise_floor
-from ..structures import LinearDamping, LinearStiffness, Structure
+from ..estimation import estimate_force_map
 from ..surrogates import Kriging
 from ..surrogates.rkpm.basis import multi_indices
-from ..systems import GROUND
 from ._cases import COEFFICIENTS, CYCLE, REST
 from ._rows import Outcome, Row, Tell
-from ._simulated import MOTION, Run, oscillator
+from ._simulated import Run, oscillator
 
 LEVELS = 0.02, 0.05
 """Standard deviation of the noise over the largest value of each channel."""
-REPETITIONS = 5
+REPETITIONS = 20
 """Drives, each with its own draw of the noise."""
-DRAWS = 20
-"""Records drawn anew from what was found, for bias and interval of every number."""
-PASSES = 2
-"""How often bias and scatter are found, each time for the map that the last pass has cleared."""
-SECTION = 801
+DRAWS = 100
+"""Maps drawn from what is known, for the interval of every number."""
+FREE = 20
+"""Those of them whose free motion is simulated."""
+SECTION = 401
 """Points along v = 0 between which points of rest are looked for."""
-TABLE, STEPS, ROUNDS = 64, 2000, 12.0
+TABLE, STEPS, ROUNDS = 24, 2000, 12.0
 """Points of a map's table along each axis, steps of a free motion, and its length [s]: four periods."""
 
 TITLES = {
@@ -61,7 +58,6 @@ class Finding:
     Attributes
     ----------
     value : float
-        Cleared of its bias.
     low, high : float
         95 % interval.
     truth : float
@@ -100,7 +96,7 @@ def kriging_rows(name: str, level: float, repetitions: int = REPETITIONS, draws:
     repetitions : int
         Number of drives.
     draws : int
-        Records drawn anew for every pass of `findings`.
+        Maps drawn for the intervals.
     """
     case, found = f"{TITLES[name]}, {level:.0%} noise", []
     for seed in range(repetitions):
@@ -129,7 +125,7 @@ def _amiss(name: str, case: str, maps: Sequence[Kriging]) -> list[Row]:
     theta, variance, noise = NUMBERS[name]
     ours = np.median([0.5 / np.asarray(one.length_scale) ** 2 for one in maps], axis=0)
     copied = "printed alike for both of Duffing's oscillators: copied" if "duffing" in name else ""
-    scaled = "θ = 1/(2ℓ²); the paper does not say how x and v are scaled. " + copied
+    scaled = "θ = 1/(2ℓ²); the paper does not say how x and v are scaled" + bool(copied) * f"; {copied}"
     names = ("displacement", "m"), ("velocity", "m/s"), ("acceleration", "m/s²"), ("force", "N")
     rows = [
         Row(case, "θ of x", "1/m²", theta[0], float(ours[0]), remark=scaled),
@@ -151,16 +147,15 @@ def _amiss(name: str, case: str, maps: Sequence[Kriging]) -> list[Row]:
     return rows
 
 
-def krige(states: Any, force: Any, like: Kriging | None = None) -> Kriging:
-    """The paper's map: Gaussian correlation, cubic trend; hyper-parameters of `like` are kept.
+def krige(states: Any, force: Any) -> Kriging:
+    """The paper's map: Gaussian correlation, cubic trend.
 
     Parameters
     ----------
     states, force : (n, 2) and (n,) arrays
         m, m/s; N.
     """
-    kept = {} if like is None else {"length_scale": like.length_scale, "nugget": float(like.nugget)}
-    return Kriging.fit(states, force, trend="cubic", **kept)
+    return Kriging.fit(states, force, trend="cubic")
 
 
 def findings(name: str, readings: Run, draws: int = DRAWS, seed: int = 0) -> tuple[dict[str, Finding], Kriging]:
@@ -180,71 +175,45 @@ def findings(name: str, readings: Run, draws: int = DRAWS, seed: int = 0) -> tup
     findings : dict of name to Finding
         Coefficients are those of the cubic nearest to the map over the readings. Of every true point of rest the
         nearest found, with all displacements about it at which a force of zero cannot be refused; it is left out if
-        there is none, a period if half of the draws have none.
+        there is none, a period if half of the drawn maps have none.
 
     Notes
     -----
-    Errors of smoothed states are neither white nor independent of those of the force, and a smoother flattens peaks:
-    standard errors of the map are too small for what is read off it, and coefficients are drawn towards zero. So a
-    motion that the map makes, near the estimated one, is simulated, noise as large as was found is added to every
-    channel `draws` times, and each record goes the same way, with the smoother and the hyper-parameters kept. The mean
-    of what comes out, less what went in, is the bias; the scatter makes the interval, by Student's t. A second pass
-    sets out from the map that the first has cleared, whose bias is that of the truth more nearly. Points of rest are
-    where the force at v = 0, cleared of its own bias, is zero: they may vanish in a draw, the force does not.
+    The map is estimated together with the motion, so that maps drawn from what is then known differ as much as noise on
+    every channel makes them. Numbers are read off the mean, their scatter off the draws.
     """
-    motion, again = motion_and_smoother(readings.record)
-    force = np.asarray(readings.record.force)
-    states, forces = _readings_of(motion, force)
-    force_map = krige(states, forces)
-    low, high = np.asarray(force_map.box)[:, 0]
-    line = np.linspace(low, high, SECTION)
-    first = _numbers(name, force_map, states, line)
-    time, rng = np.asarray(readings.record.time), np.random.default_rng([seed, 5])
-    rough, source, sent, drawn = noise_floor(force[:, 0], float(time[1] - time[0])).std, force_map, first, []
-    for _ in range(PASSES):
-        led, drive = _led(source, motion, force, states)
-        drawn, mean = [], np.zeros(len(states))
-        for _ in range(draws):
-            channels: Any = {
-                kind: np.asarray(getattr(led, kind)) + motion.noise[kind] * rng.standard_normal(force.shape)
-                for kind in MOTION
-            }
-            noisy = drive + rough * rng.standard_normal(force.shape)
-            found_states, found_forces = _readings_of(again(Record(time, force=noisy, **channels)), noisy)
-            one = krige(found_states, found_forces, force_map)
-            drawn.append(_numbers(name, one, found_states, line))
-            mean += np.asarray(one.evaluate(states)) / draws
-        sent = _numbers(name, source, states, line)
-        source = krige(states, np.asarray(force_map.evaluate(states) + source.evaluate(states)) - mean, force_map)
-    value, half = _cleared(first, sent, np.array(drawn))
-    rest = len(first) - SECTION
-    truths = [truth for _, _, _, _, _, truth in COEFFICIENTS[name]] + [CYCLE[0]] * (name == "van_der_pol")
-    symbols = [symbol for symbol, *_ in COEFFICIENTS[name]] + ["period"] * (name == "van_der_pol")
-    found = {
-        symbol: Finding(float(value[i]), float(value[i] - half[i]), float(value[i] + half[i]), truth)
-        for i, (symbol, truth) in enumerate(zip(symbols, truths, strict=True))
-        if np.isfinite(half[i])
-    }
-    for x, _, stable in REST[name]:
-        interval = _crossing(line, value[rest:], half[rest:], x)
+    force_map = estimate_force_map(readings.record, 1.0, trend="cubic")
+    states, (low, high) = readings.states, np.asarray(force_map.box)
+    line = np.linspace(low[0], high[0], SECTION)
+    x, v = (np.linspace(low[k], high[k], TABLE) for k in (0, 1))
+    grid = np.stack(np.meshgrid(x, v, indexing="ij"), axis=-1).reshape(-1, 2)
+    where = np.concatenate([states, np.stack([line, np.zeros_like(line)], axis=1), grid])
+    mean = np.asarray(force_map.evaluate(where))
+    drawn = np.asarray(force_map.sample(where, draws, jax.random.key(seed)))
+    ends = [len(states), len(states) + SECTION]
+    (at_states, rest, _), (some_states, some_rest, tables) = (np.split(q, ends, axis=-1) for q in (mean, drawn))
+    found: dict[str, Finding] = {}
+    values, scatter = _coefficients(name, states, at_states), _coefficients(name, states, some_states).std(axis=0)
+    for (symbol, *_, truth), value, std in zip(COEFFICIENTS[name], values, scatter, strict=True):
+        found[symbol] = _within(float(value), float(std), draws, truth)
+    if name == "van_der_pol":
+        periods = np.array([period_of(x, v, table) for table in tables[:FREE].reshape(-1, TABLE, TABLE)])
+        seen = periods[np.isfinite(periods)]
+        value = period_of(x, v, mean[ends[1] :].reshape(TABLE, TABLE))
+        if len(seen) > len(periods) // 2 and math.isfinite(value):
+            found["period"] = _within(value, float(seen.std(ddof=1)), len(seen), CYCLE[0])
+    half = student.ppf(0.975, draws - 1) * some_rest.std(axis=0, ddof=1)
+    for place, _, stable in REST[name]:
+        interval = _crossing(line, rest, half, place)
         if interval is not None:
-            found[f"x* near {x:.2f}, {'' if stable else 'un'}stable"] = Finding(*interval, x)
+            found[f"x* near {place:.2f}, {'' if stable else 'un'}stable"] = Finding(*interval, place)
     return found, force_map
 
 
-def _cleared(
-    first: Float[np.ndarray, " k"], sent: Float[np.ndarray, " k"], drawn: Float[np.ndarray, "draws k"]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers less the bias between what was sent and what was drawn, and half their 95 % intervals.
-
-    NaN where half of the draws have none.
-    """
-    count = np.sum(np.isfinite(drawn), axis=0)
-    enough = (count > max(1, len(drawn) // 2)) & np.isfinite(first) & np.isfinite(sent)
-    drawn, many = np.where(enough, drawn, 0.0), np.maximum(count, 2)
-    std = np.nanstd(drawn, axis=0, ddof=1) * np.sqrt(1.0 + 1.0 / many)
-    value = first + sent - np.nanmean(drawn, axis=0)
-    return np.where(enough, value, np.nan), np.where(enough, student.ppf(0.975, many - 1) * std, np.nan)
+def _within(value: float, std: float, draws: int, truth: float) -> Finding:
+    """A number and its 95 % interval, by Student's t."""
+    half = float(student.ppf(0.975, draws - 1)) * std
+    return Finding(value, value - half, value + half, truth)
 
 
 def _crossing(
@@ -274,55 +243,28 @@ def _crossing(
     return place, low, high
 
 
-def _led(
-    force_map: Kriging, motion: Motion, force: Float[np.ndarray, "n 1"], states: Float[np.ndarray, "n 2"]
-) -> tuple[Response, Float[np.ndarray, "n 1"]]:
-    """A motion of the map beside the estimated one, to which spring and dashpot draw it, and all force on the map.
-
-    By itself it would part from that, in a double well soon, and show the map where it knows little.
-    """
-    spread = states.std(axis=0)
-    rate = float(spread[1] / spread[0])
-    leads = LinearStiffness(rate**2, at=GROUND), LinearDamping(2.0 * rate, at=GROUND)
-    pull = rate**2 * motion.displacement + 2.0 * rate * motion.velocity
-    led = simulate(Structure([1.0], [force_map.on(), *leads]), Record(motion.time, force=force + pull, at_rest=True))
-    own = rate**2 * np.asarray(led.displacement) + 2.0 * rate * np.asarray(led.velocity)
-    return led, force + pull - own
-
-
-def _readings_of(motion: Motion, force: Float[np.ndarray, "n 1"]) -> tuple[np.ndarray, np.ndarray]:
-    """States and restoring force (2) of a unit mass."""
-    return np.concatenate([motion.displacement, motion.velocity], axis=1), (force - motion.acceleration)[:, 0]
-
-
-def _numbers(
-    name: str, force_map: Kriging, states: Float[np.ndarray, "n 2"], line: Float[np.ndarray, " k"]
-) -> Float[np.ndarray, " numbers"]:
-    """What a map says: coefficients, period of van der Pol's oscillator, force along v = 0."""
+def _coefficients(
+    name: str, states: Float[np.ndarray, "n 2"], force: Float[np.ndarray, "*draws n"]
+) -> Float[np.ndarray, "*draws coefficients"]:
+    """Those of the cubic nearest to the force at the states."""
     exponents = multi_indices(2, 3)
     powers = np.stack([np.prod(states**e, axis=1) for e in map(np.array, exponents)], axis=1)
-    cubic = np.linalg.lstsq(powers, np.asarray(force_map.evaluate(states)), rcond=None)[0]
-    nearest = dict(zip(exponents, cubic, strict=True))
+    cubic = np.linalg.lstsq(powers, force.T, rcond=None)[0]
     found = [
-        factor * math.prod(map(math.factorial, orders)) * float(nearest[orders])
+        factor * math.prod(map(math.factorial, orders)) * cubic[exponents.index(orders)]
         for _, _, orders, factor, _, _ in COEFFICIENTS[name]
     ]
-    period = [period_of(force_map)] if name == "van_der_pol" else []
-    force = np.asarray(force_map.evaluate(np.stack([line, np.zeros_like(line)], axis=1)))
-    return np.concatenate([found, period, force])
+    return np.stack(found, axis=-1)
 
 
-def period_of(force_map: Kriging) -> float:
-    """Time [s] between the last two upward passages of v = 0 of a free motion; NaN where there are no two."""
-    low, high = np.asarray(force_map.box)
-    x, v = (np.linspace(low[k], high[k], TABLE) for k in (0, 1))
-    grid = np.stack(np.meshgrid(x, v, indexing="ij"), axis=-1).reshape(-1, 2)
-    table = RectBivariateSpline(x, v, np.asarray(force_map.evaluate(grid)).reshape(TABLE, TABLE))
+def period_of(x: Float[np.ndarray, " k"], v: Float[np.ndarray, " l"], force: Float[np.ndarray, "k l"]) -> float:
+    """Time [s] between the last two upward passages of v = 0 of a free motion under a tabled force; NaN if none."""
+    table = RectBivariateSpline(x, v, force)
 
     def flow(state: np.ndarray) -> np.ndarray:
         return np.array([state[1], -float(table.ev(state[0], state[1]))])
 
-    step, state, passed = ROUNDS / STEPS, np.array([min(1.0, high[0]), 0.0]), []
+    step, state, passed = ROUNDS / STEPS, np.array([min(1.0, x[-1]), 0.0]), []
     for count in range(STEPS):
         a = flow(state)
         b = flow(state + 0.5 * step * a)

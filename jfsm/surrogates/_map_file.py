@@ -38,7 +38,7 @@ from .kriging import (
     Spherical,
     Spline,
 )
-from .kriging.posterior import Posterior
+from .kriging.posterior import FilteredPosterior, Posterior
 from .kriging.trend import TrendBasis
 from .moving_least_squares import MovingLeastSquares
 from .polynomial import Polynomial
@@ -52,7 +52,7 @@ HEADER, FORMAT = "header", "jfsm force state map, 1"
 MAPS = (RKPM, Kriging, MovingLeastSquares, RadialBasis, Polynomial, HermiteTable)
 PARTS = (
     Nodes, Rule, CubicSplineWindow, QuarticSplineWindow, GaussianWindow, Plane, Discontinuity,
-    Posterior, TrendBasis, PolynomialTrend,
+    Posterior, FilteredPosterior, TrendBasis, PolynomialTrend,
     Gaussian, Exponential, PowerExponential, Linear, Spherical, Cubic, Spline, Matern32, Matern52,
 )  # fmt: skip
 KNOWN = {known.__name__: known for known in (*MAPS, *PARTS)}

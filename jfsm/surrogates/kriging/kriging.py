@@ -23,7 +23,7 @@ from .fitting import Options, Part, fit_part
 from .leave_one_out import LeaveOneOut
 from .likelihood import Readings
 from .likelihood import negative_log_likelihood as _negative_log_likelihood
-from .posterior import Orders, Posterior, derivatives_at, draw, left_out, standard_errors_at
+from .posterior import AbstractPosterior, Orders, Posterior, derivatives_at, draw, left_out, standard_errors_at
 from .readings import check_readings
 from .trend import PolynomialTrend, as_trend, trend_basis
 
@@ -47,7 +47,7 @@ class Kriging(AbstractForceStateMap):
     with process variance σ², nugget ν, and r_i = 1 unless the noise of the readings differs.
     """
 
-    parts: tuple[Posterior, ...]
+    parts: tuple[AbstractPosterior, ...]
     """One for all outputs where they share their hyper-parameters, else one per output, or per field of a mixture."""
     optima: Float[Array, " parts"]
     reach: Float[Array, ""]
@@ -299,8 +299,20 @@ class Kriging(AbstractForceStateMap):
         return within(points, float(self.reach), self._states(states) / scale)
 
     def leave_one_out(self) -> LeaveOneOut:
-        """Every reading (or mean of merged readings) predicted from all others, in closed form."""
-        found = [left_out(part) for part in self.parts]
+        """Every reading (or mean of merged readings) predicted from all others, in closed form.
+
+        Raises
+        ------
+        ValueError
+            If the map was estimated together with its motion.
+        """
+        parts = [part for part in self.parts if isinstance(part, Posterior)]
+        if not parts:
+            raise ValueError(
+                "The map has no readings to leave out: it was estimated together with its motion, all of which each "
+                "reading tells of. `Kriging.fit` makes maps of single readings."
+            )
+        found = [left_out(part) for part in parts]
         residual, std = self._joined([one[0] for one in found]), self._joined_std([one[1] for one in found])
         return LeaveOneOut(np.asarray(residual), np.asarray(std))
 
@@ -388,12 +400,12 @@ def _likelihood(log_parameters, states, force, correlation, trend, restricted):
     return _negative_log_likelihood(log_parameters, readings, jnp.zeros(()))
 
 
-def _scaled(part: Posterior) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _scaled(part: AbstractPosterior) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Points in standard deviations of their columns, and these."""
     states = np.asarray(part.states)
     scale = states.std(axis=0)
     return states / scale, scale
 
 
-def _reach(part: Posterior) -> Float[Array, ""]:
+def _reach(part: AbstractPosterior) -> Float[Array, ""]:
     return jnp.asarray(reach_of(_scaled(part)[0], part.trend.triangle.shape[0]))

@@ -1,4 +1,6 @@
-"""The field given the readings: mean, derivatives and their standard errors, at fixed hyper-parameters."""
+"""The field given what was read: mean, derivatives and their standard errors, at fixed hyper-parameters."""
+
+import abc
 
 import equinox as eqx
 import jax
@@ -14,26 +16,20 @@ from .trend import TrendBasis
 Orders = tuple[int, ...]
 
 
-class Posterior(eqx.Module):
-    """Outputs that share their hyper-parameters, conditioned on readings."""
+class AbstractPosterior(eqx.Module):
+    """Outputs that share their hyper-parameters, with a mean and a covariance everywhere."""
 
-    correlation: AbstractCorrelation
-    trend: TrendBasis
-    states: Float[Array, "n dim"]
-    length_scale: Float[Array, " dim"]
-    nugget: Float[Array, ""]
-    jitter: Float[Array, ""]
-    relative_noise: Float[Array, " n"]
-    process_variance: Float[Array, " outputs"]
-    trend_coefficients: Float[Array, "p outputs"]
+    correlation: eqx.AbstractVar[AbstractCorrelation]
+    trend: eqx.AbstractVar[TrendBasis]
+    states: eqx.AbstractVar[Float[Array, "n dim"]]
+    length_scale: eqx.AbstractVar[Float[Array, " dim"]]
+    nugget: eqx.AbstractVar[Float[Array, ""]]
+    jitter: eqx.AbstractVar[Float[Array, ""]]
+    process_variance: eqx.AbstractVar[Float[Array, " outputs"]]
+    trend_coefficients: eqx.AbstractVar[Float[Array, "p outputs"]]
     """β of eq. 65, of the orthonormal functions."""
-    weights: Float[Array, "n outputs"]
+    weights: eqx.AbstractVar[Float[Array, "n outputs"]]
     """K⁻¹(g - Fβ) of eq. 69."""
-    factor: Float[Array, "n n"]
-    basis: Float[Array, "n p"]
-    """U of L⁻¹F = U T."""
-    triangle: Float[Array, "p p"]
-    unbias: Float[Array, ""]
 
     def derivatives(self, states: Float[Array, "q dim"], orders: tuple[Orders, ...]) -> Float[Array, "q d outputs"]:
         """Eq. 69 and its derivatives at several states."""
@@ -56,6 +52,39 @@ class Posterior(eqx.Module):
         prior = self.correlation.between(states, states, self.length_scale)
         return prior - explained.T @ explained + unexplained.T @ unexplained
 
+    @property
+    @abc.abstractmethod
+    def unbiased_variance(self) -> Float[Array, " outputs"]:
+        """σ² as error bars need it."""
+
+    @abc.abstractmethod
+    def _prediction(self, states: Float[Array, "q dim"], orders: Orders) -> tuple[Array, Array]:
+        """Columns (_, q) whose squares what was read explains of the prior's variance, and columns whose squares the
+        doubt about what was learned adds to it."""
+
+    def _at(self, states: Float[Array, "q dim"], orders: Orders) -> tuple[Array, Array]:
+        return self.trend(states, orders), self.correlation.between(states, self.states, self.length_scale, orders)
+
+
+class Posterior(AbstractPosterior):
+    """The field given readings of the force, each with noise of its own."""
+
+    correlation: AbstractCorrelation
+    trend: TrendBasis
+    states: Float[Array, "n dim"]
+    length_scale: Float[Array, " dim"]
+    nugget: Float[Array, ""]
+    jitter: Float[Array, ""]
+    relative_noise: Float[Array, " n"]
+    process_variance: Float[Array, " outputs"]
+    trend_coefficients: Float[Array, "p outputs"]
+    weights: Float[Array, "n outputs"]
+    factor: Float[Array, "n n"]
+    basis: Float[Array, "n p"]
+    """U of L⁻¹F = U T."""
+    triangle: Float[Array, "p p"]
+    unbias: Float[Array, ""]
+
     def left_out(self) -> tuple[Float[Array, "n outputs"], Float[Array, "n outputs"]]:
         """Error of the prediction of every reading from all others, and its standard error, noise included.
 
@@ -70,7 +99,7 @@ class Posterior(eqx.Module):
 
     @property
     def unbiased_variance(self) -> Float[Array, " outputs"]:
-        """σ² over n - p, which is what error bars need: eq. 66 divides by n."""
+        """σ² over n - p: eq. 66 divides by n."""
         return self.process_variance * self.unbias
 
     def _prediction(self, states: Float[Array, "q dim"], orders: Orders) -> tuple[Array, Array]:
@@ -81,8 +110,35 @@ class Posterior(eqx.Module):
         trend_of = self.triangle.T @ (self.basis.T @ explained)  # FᵀK⁻¹r
         return explained, solve_triangular(self.triangle, trend.T - trend_of, trans=1)
 
-    def _at(self, states: Float[Array, "q dim"], orders: Orders) -> tuple[Array, Array]:
-        return self.trend(states, orders), self.correlation.between(states, self.states, self.length_scale, orders)
+
+class FilteredPosterior(AbstractPosterior):
+    """The field given a motion that was filtered together with it: with Z at the `states`, R = LLᵀ and γ = L⁻¹Z, the
+    trend coefficients β and γ are jointly normal."""
+
+    correlation: AbstractCorrelation
+    trend: TrendBasis
+    states: Float[Array, "n dim"]
+    """Nodes, at which the field is a state of the filter."""
+    length_scale: Float[Array, " dim"]
+    nugget: Float[Array, ""]
+    jitter: Float[Array, ""]
+    process_variance: Float[Array, " outputs"]
+    trend_coefficients: Float[Array, "p outputs"]
+    weights: Float[Array, "n outputs"]
+    factor: Float[Array, "n n"]
+    """L, of the nodes without noise."""
+    doubt: Float[Array, "both both"]
+    """Root C of the covariance CCᵀ of (β, γ), over σ."""
+
+    @property
+    def unbiased_variance(self) -> Float[Array, " outputs"]:
+        """σ² as it is."""
+        return self.process_variance
+
+    def _prediction(self, states: Float[Array, "q dim"], orders: Orders) -> tuple[Array, Array]:
+        trend, correlation = self._at(states, orders)
+        explained = solve_triangular(self.factor, correlation.T, lower=True)
+        return explained, self.doubt.T @ jnp.concatenate([trend.T, explained])
 
 
 @eqx.filter_jit
@@ -114,14 +170,14 @@ def condition(
     )
 
 
-derivatives_at = eqx.filter_jit(Posterior.derivatives)
-standard_errors_at = eqx.filter_jit(Posterior.standard_errors)
+derivatives_at = eqx.filter_jit(AbstractPosterior.derivatives)
+standard_errors_at = eqx.filter_jit(AbstractPosterior.standard_errors)
 left_out = eqx.filter_jit(Posterior.left_out)
 
 
 @eqx.filter_jit
 def draw(
-    posterior: Posterior, states: Float[Array, "q dim"], count: int, key: Array
+    posterior: AbstractPosterior, states: Float[Array, "q dim"], count: int, key: Array
 ) -> Float[Array, "count q outputs"]:
     """Force at the states in several equally plausible maps."""
     covariance = posterior.covariance(states)
