@@ -8,7 +8,7 @@ import pytest
 import jfsm
 from jfsm.surrogates import tabulate
 
-RATE, SAMPLES = 50.0, 1200
+RATE, SAMPLES = 50.0, 800
 TIME = np.arange(SAMPLES) / RATE
 
 
