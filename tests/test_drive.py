@@ -96,10 +96,10 @@ def test_a_drive_does_not_depend_on_what_comes_after_the_record_ends():
     np.testing.assert_allclose(fine.force[:-1, 1, 0], np.arange(89) + 0.5, atol=2e-4)
 
 
-def test_a_drive_runs_on_the_clock_of_the_record_and_is_padded_with_nothing():
+def test_a_drive_runs_on_the_clock_of_the_record_and_is_padded_with_its_last_value():
     fine = excitation(record(), 2, 2, length=112)
     assert fine.force.shape == (112, 5, 2)
-    assert not np.any(fine.force[90:])
+    assert np.all(fine.force[89:, :, 0] == fine.force[88, -1, 0]), "what a late sensor would have shown next"
     assert not np.any(fine.force[:, :, 1]), "no force is applied where none is measured"
     np.testing.assert_allclose(fine.time, 5.0 + 0.1 * np.arange(112), rtol=1e-13)
 

@@ -12,6 +12,8 @@ from ._effect import Effect, names, places
 
 _FILTERED, _PREDICTED = 2.0, 3.0
 """Periods of filtering before, and of free prediction in, every window."""
+_LATE = 8
+"""Samples at the end by which nothing is judged: what drives them a late force sensor shows after the record only."""
 _RUN_AWAY = 1e6
 """Error, in spreads of a channel, at which a prediction counts as run away."""
 _SLIGHT = 3.0
@@ -171,7 +173,7 @@ def _windows(nuisances: Nuisances) -> tuple[np.ndarray, np.ndarray]:
     n, period = nuisances.samples, 2 * np.pi / (nuisances.omega * nuisances.record.dt)
     period = min(period, n / (2 * (_FILTERED + _PREDICTED)))
     phase = np.arange(n) % max(int(round((_FILTERED + _PREDICTED) * period)), 2)
-    free = phase >= int(round(_FILTERED * period))
+    free = (phase >= int(round(_FILTERED * period))) & (np.arange(n) < n - _LATE)
     channels = len(nuisances.channels)
     return np.repeat((~free)[:, None], channels, 1).astype(float), free
 

@@ -134,7 +134,7 @@ def excitation(
     length: int | None = None,
     force: np.ndarray | None = None,
 ) -> Fine:
-    """Drive of a record on half steps, padded to `length` samples with nothing.
+    """Drive of a record on half steps, padded to `length` samples with its last value, which a late sensor asks for.
 
     `force` (n, dof) replaces the record's own samples where they were smoothed or restored beforehand.
     """
@@ -146,10 +146,11 @@ def excitation(
     intervals = np.zeros((padded, factor + 1, dof + 1))
     if method == "hold":  # up to the end of its interval: the jump belongs to the next
         intervals[:n] = both[:, None]
+        intervals[n:] = both[-1]
     else:
         take = np.arange(n - 1)[:, None] * factor + np.arange(factor + 1)
         intervals[: n - 1] = reconstruct(both, factor, method)[take]
-        intervals[n - 1] = both[-1]  # leads to no sample
+        intervals[n - 1 :] = both[-1]  # leads to no sample
     time = record.time[0] + record.dt * np.arange(padded)
     return Fine(
         jnp.asarray(intervals[..., :dof]), jnp.asarray(intervals[..., dof]), jnp.asarray(time), jnp.asarray(record.dt)
