@@ -50,6 +50,15 @@ def test_a_cause_that_leaves_nothing_is_as_sure_as_its_evidence():
     assert found > 0.995 and rival < 0.005
 
 
+def test_a_cause_is_the_less_sure_the_more_other_shapes_would_gain_beside_it():
+    def share(nats: float) -> float:
+        found = trial(9000.0, 0.002, "coulomb")
+        return decide(GIVEN, REFITTED, [found], lambda t: None, lambda t: nats, periods=100.0).share(found)
+
+    sure = share(15.0)  # what noise may gain
+    assert sure > 0.95 and share(410.0) == pytest.approx(0.75 * sure, rel=1e-3) and share(801.0) == 0.0
+
+
 @pytest.mark.parametrize(("other", "verdict"), [("cubic_hardening", "undecided"), ("smooth_coulomb", "cause")])
 def test_no_cause_is_named_that_is_hardly_likelier_than_one_of_another_family_and_leaves_something(other, verdict):
     refitted = trial(1000.0, 0.04)

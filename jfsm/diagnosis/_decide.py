@@ -4,7 +4,7 @@ A cause must do three things: be more probable than its absence, explain at leas
 model leaves, and do so on every set of samples, held-out ones included. Where the winner leaves nothing but noise, its
 evidence is trusted as it stands; where it does not, evidence counts no more than some tens of independent looks, and
 no cause is more probable than the share of the power that it explains. And no cause is named beside which laws of other
-shapes would gain more than a small share of what it gains itself.
+shapes would gain more than a small share of what it gains itself; up to there it is the less sure, by half at most.
 """
 
 import math
@@ -167,7 +167,9 @@ def decide(
         verdict = "undecided"
     if verdict == "cause":
         fewer = [t.evidence for t in (given, refitted, *tried) if len(t.effects) < len(winner.effects)]
-        if _unfit(winner, winner.evidence - max(fewer), lack_of_fit(winner)):
+        doubt = _doubt(winner, winner.evidence - max(fewer), lack_of_fit(winner))
+        chance[id(winner)] *= 1.0 - 0.5 * min(doubt, 1.0)
+        if doubt > 1.0:
             why[id(winner)], chance[id(winner)] = "explains much of it, but is not of the right shape", 0.0
             mapped = stand_in(refitted)
             stands_in = mapped is not None and explained(mapped, refitted) >= GATE
@@ -235,9 +237,10 @@ def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
     return ""
 
 
-def _unfit(winner: Trial, gained: float, nats: float) -> bool:
-    """Whether laws of other shapes would gain too much beside the winner, whose last effect gained so many nats."""
-    return nats > max(_UNFIT, (_UNFIT_OF_WHITE if white(winner) else _UNFIT_SHARE[len(winner.effects)]) * gained)
+def _doubt(winner: Trial, gained: float, nats: float) -> float:
+    """How far laws of other shapes gain beside the winner, whose last effect gained so many nats; above 1: too much."""
+    share = _UNFIT_OF_WHITE if white(winner) else _UNFIT_SHARE[len(winner.effects)]
+    return max(nats - _UNFIT, 0.0) / max(share * gained - _UNFIT, 1e-9)
 
 
 def _verdict(given: Trial, refitted: Trial, winner: Trial, tried: Sequence[Trial], mapped: Trial | None) -> str:
