@@ -17,7 +17,7 @@ from ..surrogates import Kriging
 from ..surrogates.kriging.correlations import AbstractCorrelation
 from ..surrogates.kriging.posterior import FilteredPosterior
 from ..surrogates.kriging.trend import PolynomialTrend
-from ._map_filter import JITTER, Field, Filming, Hyper, Smoothed, cost, smoothed
+from ._map_filter import JITTER, Field, Hyper, Recording, Smoothed, cost, smoothed
 from ._motion import Motion, estimate_motion
 from ._part import Part
 
@@ -100,17 +100,17 @@ def estimate_force_map(
     field = Field(
         posterior.trend, posterior.correlation, jnp.asarray(_apart(states, np.asarray(posterior.length_scale), nodes))
     )
-    film = _film(record, motion, field, mass, states, force, _substeps(begin, states, mass, record.dt))
+    recording = _recording(record, motion, field, mass, states, force, _substeps(begin, states, mass, record.dt))
     smooth = np.column_stack([states, force, np.gradient(force, record.dt)])
-    smooth = jnp.asarray(np.pad(smooth, ((0, len(film.seen) - len(smooth)), (0, 0)), mode="edge"))
+    smooth = jnp.asarray(np.pad(smooth, ((0, len(recording.seen) - len(smooth)), (0, 0)), mode="edge"))
     lengths = np.clip(np.asarray(posterior.length_scale), *(spread * np.array(LENGTHS)[:, None]))
     hyper = _hyper(np.log([PROCESS * size, *lengths]))
-    found, change = _settled(film, smooth, _ridge(field, hyper, states, begin), hyper, spread)
+    found, change = _settled(recording, smooth, _ridge(field, hyper, states, begin), hyper, spread)
     for _ in range(ROUNDS - 1):
-        hyper = _likeliest(film, found, hyper, size, spread)
-        found, change = _settled(film, found.states, found.mean, hyper, spread)
+        hyper = _likeliest(recording, found, hyper, size, spread)
+        found, change = _settled(recording, found.states, found.mean, hyper, spread)
     remark = f"The smoothed motion still changed by {change:.1g} of its size in the last pass: the map is less sure."
-    return _kriging(film, found, hyper, states, (remark,) if change > SETTLED else ())
+    return _kriging(recording, found, hyper, states, (remark,) if change > SETTLED else ())
 
 
 def _checked(record: Record, mass: Any, nodes: Any) -> float:
@@ -133,7 +133,7 @@ def _checked(record: Record, mass: Any, nodes: Any) -> float:
     return weight
 
 
-def _film(
+def _recording(
     record: Record,
     motion: Motion,
     field: Field,
@@ -141,7 +141,7 @@ def _film(
     states: Float[np.ndarray, "n 2"],
     force: Float[np.ndarray, " n"],
     substeps: int,
-) -> Filming:
+) -> Recording:
     """The record's readings without what their sensors add, padded."""
     part, n = Part.of_dof(record, 1), len(record)
     orders = tuple(("displacement", "velocity", "acceleration").index(kind) for kind, _ in part.channels)
@@ -158,7 +158,7 @@ def _film(
     fill = bucket(n) - n
     columns = np.pad(np.column_stack([*seen, force]), ((0, fill), (0, 0)), mode="edge")
     use = np.column_stack([part.use, np.full(n, float(driven))])
-    return Filming(
+    return Recording(
         field=field,
         seen=jnp.asarray(columns),
         use=jnp.asarray(np.pad(use, ((0, fill), (0, 0)))),
@@ -205,11 +205,11 @@ def _ridge(field: Field, hyper: Hyper, states: Float[np.ndarray, "n 2"], begin: 
 
 
 def _settled(
-    film: Filming, states: Any, c: Any, hyper: Hyper, spread: Float[np.ndarray, "2"]
+    recording: Recording, states: Any, c: Any, hyper: Hyper, spread: Float[np.ndarray, "2"]
 ) -> tuple[Smoothed, float]:
     """Passes of the smoother until the motion stays, and its last change."""
     for _ in range(PASSES):
-        found = smoothed(film, states, c, hyper)
+        found = smoothed(recording, states, c, hyper)
         change = float(np.max(np.abs(np.asarray(found.states - states))[:, :2] / spread))
         if not np.isfinite(change) or not np.isfinite(float(found.log_likelihood)):
             raise RuntimeError(
@@ -222,12 +222,14 @@ def _settled(
     return found, change
 
 
-def _likeliest(film: Filming, found: Smoothed, hyper: Hyper, size: float, spread: Float[np.ndarray, "2"]) -> Hyper:
+def _likeliest(
+    recording: Recording, found: Smoothed, hyper: Hyper, size: float, spread: Float[np.ndarray, "2"]
+) -> Hyper:
     """Hyper-parameters of largest posterior about a smoothed motion."""
     centre = np.log([PROCESS * size])
 
     def value(theta: np.ndarray) -> tuple[float, np.ndarray]:
-        minus, slope = cost(_hyper(theta), film, found.states, found.mean)
+        minus, slope = cost(_hyper(theta), recording, found.states, found.mean)
         away = (theta[0] - centre[0]) / DOUBT
         slope = np.append(np.asarray(slope.process_std) + away / DOUBT, np.asarray(slope.length_scale))
         return float(minus) + 0.5 * away**2, slope
@@ -244,13 +246,13 @@ def _hyper(theta: Float[np.ndarray, "3"]) -> Hyper:
 
 
 def _kriging(
-    film: Filming, found: Smoothed, hyper: Hyper, states: Float[np.ndarray, "n 2"], remarks: tuple[str, ...]
+    recording: Recording, found: Smoothed, hyper: Hyper, states: Float[np.ndarray, "n 2"], remarks: tuple[str, ...]
 ) -> Kriging:
     """The map of what the filter found."""
-    field, length_scale = film.field, jnp.exp(hyper.length_scale)
+    field, length_scale = recording.field, jnp.exp(hyper.length_scale)
     trend = field.trend.triangle.shape[0]
     variance = jnp.exp(2.0 * hyper.process_std)
-    of_force = film.variance[-1] + film.mass**2 * film.variance[-2] * (2 in film.orders)
+    of_force = recording.variance[-1] + recording.mass**2 * recording.variance[-2] * (2 in recording.orders)
     factor = field.factor(length_scale)
     values, vectors = jnp.linalg.eigh(found.covariance)
     posterior = FilteredPosterior(

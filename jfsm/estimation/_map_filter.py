@@ -56,7 +56,7 @@ class Hyper(NamedTuple):
     length_scale: Float[Array, "2"]
 
 
-class Filming(eqx.Module):
+class Recording(eqx.Module):
     """Readings of one mass on a grid, padded, and what is known of their noise.
 
     `seen` (n, channels) are the responses and, last, the measured force; those with ``use = 0`` do not count. `orders`
@@ -102,14 +102,14 @@ class Filtered(NamedTuple):
     total: Float[Array, " n"]
 
 
-def _stepped(film: Filming, state, c, base, hyper: Hyper, factor):
+def _stepped(recording: Recording, state, c, base, hyper: Hyper, factor):
     """The moving part one sample later, by the classical Runge-Kutta method, while the rate of the force stays."""
     x, v, g, rise = state
     length_scale = jnp.exp(hyper.length_scale)
 
     def rate(moved, after):
-        held = film.field.functions(moved[None], length_scale, factor)[0] @ c
-        return jnp.stack([moved[1], (g + rise * after - held) / film.mass - base])
+        held = recording.field.functions(moved[None], length_scale, factor)[0] @ c
+        return jnp.stack([moved[1], (g + rise * after - held) / recording.mass - base])
 
     def substep(moved, after):
         k1 = rate(moved, after)
@@ -118,35 +118,35 @@ def _stepped(film: Filming, state, c, base, hyper: Hyper, factor):
         k4 = rate(moved + h * k3, after + h)
         return moved + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4), None
 
-    h = film.dt / film.substeps
-    moved, _ = jax.lax.scan(substep, jnp.stack([x, v]), h * jnp.arange(film.substeps))
-    return jnp.concatenate([moved, jnp.stack([g + rise * film.dt, rise])])
+    h = recording.dt / recording.substeps
+    moved, _ = jax.lax.scan(substep, jnp.stack([x, v]), h * jnp.arange(recording.substeps))
+    return jnp.concatenate([moved, jnp.stack([g + rise * recording.dt, rise])])
 
 
-def _shown(film: Filming, state, c, base, hyper: Hyper, factor):
+def _shown(recording: Recording, state, c, base, hyper: Hyper, factor):
     """What the channels would show without noise."""
     x, v, g, _ = state
-    held = film.field.functions(state[None, :2], jnp.exp(hyper.length_scale), factor)[0] @ c
-    kinds = x, v, (g - held) / film.mass - base
-    return jnp.stack([*(kinds[order] for order in film.orders), g])
+    held = recording.field.functions(state[None, :2], jnp.exp(hyper.length_scale), factor)[0] @ c
+    kinds = x, v, (g - held) / recording.mass - base
+    return jnp.stack([*(kinds[order] for order in recording.orders), g])
 
 
-def _steps(film: Filming, states: Float[Array, "n 4"], c: Float[Array, " functions"], hyper: Hyper) -> Steps:
-    factor = film.field.factor(jnp.exp(hyper.length_scale))
+def _steps(recording: Recording, states: Float[Array, "n 4"], c: Float[Array, " functions"], hyper: Hyper) -> Steps:
+    factor = recording.field.factor(jnp.exp(hyper.length_scale))
 
     def first_order(of, state, base):
         def one(both):
-            return of(film, both[:MOVING], both[MOVING:], base, hyper, factor)
+            return of(recording, both[:MOVING], both[MOVING:], base, hyper, factor)
 
         both = jnp.concatenate([state, c])
         value, pull = jax.vjp(one, both)
         slope = jax.vmap(lambda row: pull(row)[0])(jnp.eye(len(value)))
         return slope, value - slope @ both
 
-    step, pushed = jax.vmap(lambda s, b: first_order(_stepped, s, b))(states, film.base)
-    rows, shift = jax.vmap(lambda s, b: first_order(_shown, s, b))(states, film.base)
+    step, pushed = jax.vmap(lambda s, b: first_order(_stepped, s, b))(states, recording.base)
+    rows, shift = jax.vmap(lambda s, b: first_order(_shown, s, b))(states, recording.base)
     still = jnp.eye(MOVING, MOVING + len(c))
-    going = film.going[:, None]
+    going = recording.going[:, None]
     return Steps(jnp.where(going[..., None] > 0, step, still), pushed * going, rows, shift)
 
 
@@ -165,12 +165,15 @@ def _wander(dt, mass) -> Float[Array, "4 4"]:
     )
 
 
-def _filtered(film: Filming, steps: Steps, hyper: Hyper) -> tuple[tuple[Array, Array], Filtered]:
+def _filtered(recording: Recording, steps: Steps, hyper: Hyper) -> tuple[tuple[Array, Array], Filtered]:
     """Moments after the last sample, and of every sample."""
-    trend = film.field.trend.triangle.shape[0]
-    std = jnp.where(jnp.arange(film.field.size) < trend, film.vague, jnp.exp(hyper.process_std))
-    start = jnp.concatenate([film.first, jnp.zeros(film.field.size)]), jnp.diag(jnp.append(film.spread, std) ** 2)
-    noise = film.walk * _wander(film.dt, film.mass)
+    trend = recording.field.trend.triangle.shape[0]
+    std = jnp.where(jnp.arange(recording.field.size) < trend, recording.vague, jnp.exp(hyper.process_std))
+    start = (
+        jnp.concatenate([recording.first, jnp.zeros(recording.field.size)]),
+        jnp.diag(jnp.append(recording.spread, std) ** 2),
+    )
+    noise = recording.walk * _wander(recording.dt, recording.mass)
 
     @jax.checkpoint
     def body(carry, inputs):
@@ -180,7 +183,7 @@ def _filtered(film: Filming, steps: Steps, hyper: Hyper) -> tuple[tuple[Array, A
         for i in range(seen.shape[0]):
             row = step.rows[i]
             cross = covariance @ row
-            spread = row @ cross + film.variance[i]
+            spread = row @ cross + recording.variance[i]
             error = seen[i] - step.shift[i] - row @ mean
             weight = use[i] * cross / spread
             mean, covariance = mean + weight * error, covariance - weight[:, None] * cross[None, :]
@@ -200,14 +203,16 @@ def _filtered(film: Filming, steps: Steps, hyper: Hyper) -> tuple[tuple[Array, A
         error, spread, weight = (jnp.stack(each) for each in zip(*readings, strict=True))
         return onward, Filtered(predicted[0], predicted[1], error, spread, weight, total)
 
-    return jax.lax.scan(body, start, (steps, film.seen, film.use, film.going))
+    return jax.lax.scan(body, start, (steps, recording.seen, recording.use, recording.going))
 
 
 @eqx.filter_jit
 @eqx.filter_value_and_grad
-def cost(hyper: Hyper, film: Filming, states: Float[Array, "n 4"], c: Float[Array, " functions"]) -> Float[Array, ""]:
+def cost(
+    hyper: Hyper, recording: Recording, states: Float[Array, "n 4"], c: Float[Array, " functions"]
+) -> Float[Array, ""]:
     """Minus log-likelihood of the readings, with its slope, about a motion and coefficients of the map."""
-    return -jnp.sum(_filtered(film, _steps(film, states, c, hyper), hyper)[1].total)
+    return -jnp.sum(_filtered(recording, _steps(recording, states, c, hyper), hyper)[1].total)
 
 
 class Smoothed(NamedTuple):
@@ -220,24 +225,26 @@ class Smoothed(NamedTuple):
 
 
 @eqx.filter_jit
-def smoothed(film: Filming, states: Float[Array, "n 4"], c: Float[Array, " functions"], hyper: Hyper) -> Smoothed:
+def smoothed(
+    recording: Recording, states: Float[Array, "n 4"], c: Float[Array, " functions"], hyper: Hyper
+) -> Smoothed:
     """The next motion and coefficients, from those about which the filter was made linear.
 
     Repeated, this is Gauss and Newton's method for the most probable motion and map (Bell and Cathey, IEEE Trans.
     Autom. Control 38 (1993) 294-297).
     """
-    steps = _steps(film, states, c, hyper)
-    (mean, covariance), filtered = _filtered(film, steps, hyper)
+    steps = _steps(recording, states, c, hyper)
+    (mean, covariance), filtered = _filtered(recording, steps, hyper)
 
     def body(slope, inputs):
         # Slope of minus the log-likelihood of all later readings, by the state predicted for them (Bierman 1973).
         step, sample, use = inputs
         slope = jnp.concatenate([jnp.zeros(MOVING), slope[MOVING:]]) + step.step.T @ slope[:MOVING]
-        for i in reversed(range(len(film.variance))):
+        for i in reversed(range(len(recording.variance))):
             told = use[i] / sample.spread[i]
             slope = slope - step.rows[i] * (sample.weight[i] @ slope + told * sample.error[i])
         return slope, (sample.mean - sample.covariance @ slope)[:MOVING]
 
-    _, found = jax.lax.scan(body, jnp.zeros(mean.shape), (steps, filtered, film.use), reverse=True)
+    _, found = jax.lax.scan(body, jnp.zeros(mean.shape), (steps, filtered, recording.use), reverse=True)
     c, spread = mean[MOVING:], covariance[MOVING:, MOVING:]
     return Smoothed(found, c, 0.5 * (spread + spread.T), jnp.sum(filtered.total))
