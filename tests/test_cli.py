@@ -503,7 +503,7 @@ def test_a_force_is_mapped_printed_shown_and_written(channels, folder, tmp_path)
         (["--mass", -2.0], "`mass` must be positive; got -2"),
         (["--mass", 2.0, "--at", "1"], "--at must be two degrees of freedom, as 0-1, where 0 is ground; it was '1'."),
         (["--mass", 2.0, "--at", "1-2"], "`model` must be given for the link (1, 2)"),
-        (["--mass", 2.0, "--method", "splines"], '`method` must be "rkpm" or "kriging"; got \'splines\'.'),
+        (["--mass", 2.0, "--method", "splines"], '`method` must be "rkpm", "kriging" or "joint"; got \'splines\'.'),
         (["--mass", 2.0, "--order", 0], "`order` must be an integer of 1 or more; got 0."),
         (["--mass", 2.0, "--out", "run.csv"], "--out must not be a file that is needed"),
     ],

@@ -33,7 +33,7 @@ LEAST_LEFT = 0.015
 # How many times the peak of the motion without the law a motion may reach: beyond it the plant is another one.
 FARTHEST = 10.0
 # How many times a small shift of the start, as a share of the motion's rms, may grow where motions may part
-# exponentially: the exact motion, good to 1e-10 a step, then is exact still.
+# exponentially: the exact motion, good to 1e-11 a step, then is exact still.
 SMALL_SHIFT, LARGEST_PARTING = 1e-6, 1e3
 # Told from a sensor's offset only by the swing with which it sets in.
 NEEDS_REST = ("preload",)

@@ -15,7 +15,7 @@ from .laws import Law
 from .laws.base import Hidden, Mode
 from .plants import EscapeError, Motion, Plant, State
 
-RELATIVE_TOLERANCE = 1e-10
+RELATIVE_TOLERANCE = 1e-11
 # How often per sample a held mass is looked at. Two crossings between looks go unseen; the slip would be below 1e-9.
 WATCHES_PER_SAMPLE = 20
 # How often a guard is looked at within a step, whose ends alone would not show that it was negative for a while.
