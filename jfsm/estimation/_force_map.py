@@ -144,7 +144,7 @@ def _recording(
 ) -> Recording:
     """The record's readings without what their sensors add, padded."""
     part, n = Part.of_dof(record, 1), len(record)
-    orders = tuple(("displacement", "velocity", "acceleration").index(kind) for kind, _ in part.channels)
+    orders = tuple(order for order, _ in part.kind(0).channels)
     base = np.zeros(n) if record.base_acceleration is None else record.base_acceleration
     seen, noise = [], []
     for order, channel in zip(orders, part.channels, strict=True):
@@ -226,17 +226,17 @@ def _likeliest(
     recording: Recording, found: Smoothed, hyper: Hyper, size: float, spread: Float[np.ndarray, "2"]
 ) -> Hyper:
     """Hyper-parameters of largest posterior about a smoothed motion."""
-    centre = np.log([PROCESS * size])
+    centre = math.log(PROCESS * size)
 
     def value(theta: np.ndarray) -> tuple[float, np.ndarray]:
         minus, slope = cost(_hyper(theta), recording, found.states, found.mean)
-        away = (theta[0] - centre[0]) / DOUBT
+        away = (theta[0] - centre) / DOUBT
         slope = np.append(np.asarray(slope.process_std) + away / DOUBT, np.asarray(slope.length_scale))
         return float(minus) + 0.5 * away**2, slope
 
     begin = np.append(np.asarray(hyper.process_std), np.asarray(hyper.length_scale))
     lengths = np.log(spread[:, None] * np.array(LENGTHS))
-    bounds = [(centre[0] - 3.0 * DOUBT, centre[0] + 2.0 * DOUBT), *lengths.tolist()]
+    bounds = [(centre - 3.0 * DOUBT, centre + 2.0 * DOUBT), *lengths.tolist()]
     best = minimize(value, begin, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": CLIMB}).x
     return _hyper(best)
 

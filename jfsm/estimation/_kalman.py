@@ -26,7 +26,7 @@ class LinearModel(eqx.Module):
     wander: Float[Array, "state state"] | None = None
 
 
-class _Filtered(NamedTuple):
+class Filtered(NamedTuple):
     """Moments predicted for every sample; error, variance and gain of every reading; log-likelihood of a sample's."""
 
     mean: Float[Array, "n state"]
@@ -37,24 +37,38 @@ class _Filtered(NamedTuple):
     total: Float[Array, " n"]
 
 
-def _filtered(model: LinearModel, pushed, seen, use, swell) -> _Filtered:
+def told_by(
+    mean: Float[Array, " state"],
+    covariance: Float[Array, "state state"],
+    rows: Float[Array, "channels state"],
+    variance: Float[Array, " channels"],
+    seen: Float[Array, " channels"],
+    counted: Float[Array, " channels"],
+) -> tuple[Float[Array, " state"], Float[Array, "state state"], Filtered]:
+    """Predicted moments once the readings of a sample are known, and what these told."""
+    predicted = mean, covariance
+    total, readings = jnp.zeros(()), []
+    for c in range(seen.shape[0]):
+        row = rows[c]
+        cross = jnp.sum(covariance * row[None, :], 1)
+        spread = jnp.sum(row * cross) + variance[c]
+        error = seen[c] - jnp.sum(row * mean)
+        weight = counted[c] * cross / spread
+        mean, covariance = mean + weight * error, covariance - weight[:, None] * cross[None, :]
+        total = total - 0.5 * counted[c] * (error**2 / spread + jnp.log(2 * jnp.pi * spread))
+        readings.append((error, spread, weight))
+    error, spread, weight = (jnp.stack(each) for each in zip(*readings, strict=True))
+    return mean, covariance, Filtered(*predicted, error, spread, weight, total)
+
+
+def _filtered(model: LinearModel, pushed, seen, use, swell) -> Filtered:
     def body(carry, inputs):
-        mean, covariance = predicted = carry
+        mean, covariance = carry
         push, y, counted, swell = inputs
-        total, readings = jnp.zeros(()), []
-        for c in range(y.shape[0]):
-            row = model.rows[c]
-            cross = jnp.sum(covariance * row[None, :], 1)
-            spread = jnp.sum(row * cross) + model.variance[c]
-            error = y[c] - jnp.sum(row * mean)
-            weight = counted[c] * cross / spread
-            mean, covariance = mean + weight * error, covariance - weight[:, None] * cross[None, :]
-            total = total - 0.5 * counted[c] * (error**2 / spread + jnp.log(2 * jnp.pi * spread))
-            readings.append((error, spread, weight))
+        mean, covariance, sample = told_by(mean, covariance, model.rows, model.variance, y, counted)
         noise = model.noise if model.wander is None else model.noise + swell * model.wander
         onward = (model.step @ mean + push, model.step @ covariance @ model.step.T + noise)
-        error, spread, weight = (jnp.stack(each) for each in zip(*readings, strict=True))
-        return onward, _Filtered(predicted[0], predicted[1], error, spread, weight, total)
+        return onward, sample
 
     start = (jnp.zeros(model.start.shape[0]), model.start)
     swell = jnp.ones(len(seen)) if swell is None else swell

@@ -1,6 +1,5 @@
 """The filter of a motion whose force map is part of its state, about a motion that was smoothed before."""
 
-import math
 from typing import NamedTuple
 
 import equinox as eqx
@@ -12,6 +11,7 @@ from jaxtyping import Array, Float
 
 from ..surrogates.kriging.correlations import AbstractCorrelation
 from ..surrogates.kriging.trend import TrendBasis
+from ._kalman import Filtered, told_by
 
 MOVING = 4
 """Displacement, velocity, force and rate of the force come first in the state; the coefficients of the map, which stay,
@@ -91,17 +91,6 @@ class Steps(NamedTuple):
     shift: Float[Array, "n channels"]
 
 
-class Filtered(NamedTuple):
-    """Moments predicted for every sample; error, variance and gain of every reading; log-likelihood of a sample's."""
-
-    mean: Float[Array, "n state"]
-    covariance: Float[Array, "n state state"]
-    error: Float[Array, "n channels"]
-    spread: Float[Array, "n channels"]
-    weight: Float[Array, "n channels state"]
-    total: Float[Array, " n"]
-
-
 def _stepped(recording: Recording, state, c, base, hyper: Hyper, factor):
     """The moving part one sample later, by the classical Runge-Kutta method, while the rate of the force stays."""
     x, v, g, rise = state
@@ -155,14 +144,9 @@ def _wander(dt, mass) -> Float[Array, "4 4"]:
 
     Four integrals of one white noise: ∫ τ^(i+j) dτ / (i! j!) (Wiener process integrated up to three times).
     """
-    lever = [dt**i / math.factorial(i) / (mass if i > 1 else 1.0) for i in (3, 2, 1, 0)]
-    powers = (3, 2, 1, 0)
-    return jnp.stack(
-        [
-            jnp.stack([p * q * dt / (i + j + 1) for q, j in zip(lever, powers, strict=True)])
-            for p, i in zip(lever, powers, strict=True)
-        ]
-    )
+    powers = jnp.arange(MOVING - 1.0, -1.0, -1.0)
+    lever = jnp.stack([dt**3 / (6.0 * mass), dt**2 / (2.0 * mass), dt, jnp.ones(())])
+    return dt * jnp.outer(lever, lever) / (powers[:, None] + powers[None, :] + 1.0)
 
 
 def _filtered(recording: Recording, steps: Steps, hyper: Hyper) -> tuple[tuple[Array, Array], Filtered]:
@@ -177,18 +161,9 @@ def _filtered(recording: Recording, steps: Steps, hyper: Hyper) -> tuple[tuple[A
 
     @jax.checkpoint
     def body(carry, inputs):
-        mean, covariance = predicted = carry
+        mean, covariance = carry
         step, seen, use, going = inputs
-        total, readings = jnp.zeros(()), []
-        for i in range(seen.shape[0]):
-            row = step.rows[i]
-            cross = covariance @ row
-            spread = row @ cross + recording.variance[i]
-            error = seen[i] - step.shift[i] - row @ mean
-            weight = use[i] * cross / spread
-            mean, covariance = mean + weight * error, covariance - weight[:, None] * cross[None, :]
-            total = total - 0.5 * use[i] * (error**2 / spread + jnp.log(2 * jnp.pi * spread))
-            readings.append((error, spread, weight))
+        mean, covariance, sample = told_by(mean, covariance, step.rows, recording.variance, seen - step.shift, use)
         led = step.step @ covariance
         moving = led @ step.step.T + going * noise
         onward = (
@@ -200,8 +175,7 @@ def _filtered(recording: Recording, steps: Steps, hyper: Hyper) -> tuple[tuple[A
                 ]
             ),
         )
-        error, spread, weight = (jnp.stack(each) for each in zip(*readings, strict=True))
-        return onward, Filtered(predicted[0], predicted[1], error, spread, weight, total)
+        return onward, sample
 
     return jax.lax.scan(body, start, (steps, recording.seen, recording.use, recording.going))
 
