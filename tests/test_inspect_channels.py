@@ -253,6 +253,12 @@ def test_a_noisy_crest_cut_off_at_one_level_is_clipped_however_gently_it_comes_t
     assert not clipped(np.sin(2 * np.pi * np.arange(N) / 100)).any()
 
 
+def test_crests_of_a_sample_each_are_clipped_on_both_sides():
+    y = np.sin(2 * np.pi * np.arange(N) / 10.3) + white(14, 0.001)
+    limit = np.quantile(np.abs(y), 0.94)
+    np.testing.assert_array_equal(clipped(np.clip(y, -limit, limit)), np.abs(y) >= limit)
+
+
 def test_bends_are_not_taken_for_a_signal_at_the_band_limit():
     bent = np.abs(np.sin(6.0 * T)) * np.sin(11.0 * T) + white(15, 1e-5)
     assert noise_floor(bent, DT).spacing == 2

@@ -65,6 +65,29 @@ def test_a_buckled_spring_is_placed_although_the_motion_stays_small_within_one_w
     assert middle == pytest.approx(1.0, rel=0.3)
 
 
+def test_a_law_that_shows_at_the_first_peaks_only_is_placed():
+    def decay(t, y):
+        return [y[1], -9.0 * y[0] - 0.9 * y[1] - 0.02 * y[0] ** 5]
+
+    x = solve_ivp(decay, (0, T[-1]), [3.0, 0.0], t_eval=T, rtol=1e-9, atol=1e-12).y[0]
+    assert np.max(np.abs(x)) > 8 * np.std(x)
+    r = jfsm.Record(T, displacement=x + 0.005 * np.std(x) * np.random.default_rng(7).standard_normal(T.size))
+    model, law = jfsm.Structure.sdof(1.0, 9.0, 0.9), jfsm.QuinticStiffness(1.0, at=(0, 1))
+    prepared = prepare(r, model)
+    (found,) = place(law, missing_force(model, prepared), model, scale_of(prepared, model), prepared)
+    assert found.share is not None and found.share > 0.5
+    assert 0.01 < float(found.term.values[0]) < 0.05
+
+
+@pytest.mark.parametrize("decays", [True, False])
+def test_the_corners_of_a_clipped_channel_are_no_noise(decays: bool):
+    envelope = np.exp(-0.1 * T) if decays else 1.0
+    y = envelope * (2 * np.sin(2.9 * T) + np.sin(1.7 * T) + np.cos(T))
+    y += 0.03 * np.random.default_rng(8).standard_normal(T.size)
+    prepared = prepare(jfsm.Record(T, displacement=np.clip(y, -1.8, 1.8)), MODEL)
+    assert prepared.trusted.all() and prepared.floor[0] == pytest.approx(0.03, rel=0.2)
+
+
 def test_no_law_is_placed_on_a_force_that_ran_away():
     law = jfsm.CubicStiffness(0.1, at=(0, 1))
     nuisances = prepare(record(lambda x, v: 3.0 * x**3), MODEL)

@@ -1,5 +1,6 @@
 """What every hypothesis on a record shares: its noise, its reconstructed drive, its unknown start and offsets."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -22,7 +23,7 @@ from ..dynamics._plant import Channel, Readout, lower, readout
 from ..dynamics._simulate import check_pair
 from ..dynamics._start import starting_state
 from ..estimation._filter import ProcessNoise, Readings
-from ..records import Record, clipped, noise_floor, spikes
+from ..records import NoiseFloor, Record, clipped, declipped, noise_floor, spikes
 from ..structures import Structure
 
 _LEAST_NOISE = 1e-4
@@ -36,6 +37,10 @@ _FINEST = 2
 _OVERSAMPLED = 3
 """Samples per knot from which a spline's curve may stand for the force: the band above holds noise only."""
 _MOSTLY = 0.5
+_SAME = 1e-9
+"""Rounding, relative."""
+_STRETCH = 0.25
+"""Share of a channel's samples, one after the other, that are enough to read its noise from."""
 
 
 @dataclass(frozen=True)
@@ -304,15 +309,32 @@ def _noise(
     use, floor, trusted = np.ones_like(values), np.zeros(len(channels)), np.zeros(len(channels), dtype=bool)
     notes = []
     for i, (kind, j) in enumerate(channels):
-        found = noise_floor(values[:, i], dt)
+        cut = clipped(values[:, i])
+        found = _noise_floor(values[:, i], cut, dt)
         trusted[i] = found.spacing > _FINEST
         std = found.std if trusted[i] else min(found.std, _BAND_LIMITED * spread[i])
         floor[i] = max(std, _LEAST_NOISE * spread[i])
-        lost = clipped(values[:, i]) | spikes(values[:, i], floor[i])
+        lost = cut | spikes(values[:, i], floor[i])
         if np.any(lost):
             use[lost, i] = 0.0
             notes.append(f"{kind} {j}: {int(lost.sum())} clipped or torn samples take no part.")
     return use, floor, trusted, notes
+
+
+def _noise_floor(samples: np.ndarray, cut: np.ndarray, dt: float) -> NoiseFloor:
+    """Noise of a channel, some of whose samples were cut off: the corners that they leave are none.
+
+    It is read from the longest stretch without them; where each is short, from the curve with its arcs put back.
+    """
+    edges = np.flatnonzero(np.concatenate([[True], cut, [True]]))
+    longest = int(np.argmax(np.diff(edges)))
+    begin, end = edges[longest], edges[longest + 1] - 1
+    if end - begin >= _STRETCH * len(samples):
+        return noise_floor(samples[begin:end], dt)
+    limit = float(np.max(np.abs(samples)))
+    alike = np.mean(cut) < _MOSTLY and np.all(np.abs(samples[cut]) >= limit * (1 - _SAME))
+    found = noise_floor(declipped(samples, limit) if alike else samples, dt)
+    return replace(found, std=found.std / math.sqrt(1.0 - np.mean(cut)))  # arcs that are put back hold none
 
 
 def _padded(values: np.ndarray, use: np.ndarray, variance: np.ndarray) -> Readings:

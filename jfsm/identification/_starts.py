@@ -37,7 +37,7 @@ _RUN_AWAY = 1e9
 _NO_FORCE = 1e100
 """Missing force [N] that is none."""
 _LEAST = 1e-4
-"""Size of an effect, as a share of the elastic force, below which it is no start."""
+"""Force of an effect, as a share of the elastic one in the mean square, below which it is no start."""
 _ALMOST_NONE = 1e-6
 """Share of a law's power outside springs, dashpots and constants, below which it is none."""
 _MODEST = 0.05
@@ -200,7 +200,7 @@ def place(
     )
     one_sign = all(p.positive for p in kind.parameters if p.force)
     usable = power > 1e-12 * wanted.size
-    usable &= (size > _LEAST) if one_sign else (np.abs(size) > _LEAST)
+    usable &= (size if one_sign else np.abs(size)) * np.sqrt(np.mean(forces**2, (1, 2))) > _LEAST * scale.force
     if sign:
         usable &= np.array([np.sign(s * next(iter(row.values()))) == sign for s, row in zip(size, rows, strict=True)])
     found, kept = [], []

@@ -131,9 +131,9 @@ def _at_level(y: NDArray[np.float64], level: float, inward: float, step: float) 
 def _returns(y: NDArray[np.float64], mask: NDArray[np.bool_]) -> bool:
     """Whether a noisy curve comes back to exactly the same level again and again, as noise never does by itself."""
     visits = int(np.count_nonzero(mask[1:] & ~mask[:-1]))
-    others = y[~mask]
-    distinct = np.unique(np.round((others - others.min()) / (1e-9 * float(np.ptp(y))))).size
-    return visits >= VISITS and distinct > DISTINCT * others.size
+    level = np.round((y - y.min()) / (1e-9 * float(np.ptp(y))))
+    between = level[(level > level.min()) & (level < level.max())]  # it may be cut off on both sides
+    return visits >= VISITS and np.unique(between).size > DISTINCT * between.size
 
 
 def _cut_off(y: NDArray[np.float64], mask: NDArray[np.bool_], level: float) -> bool:
