@@ -86,6 +86,13 @@ def test_no_cause_is_named_beside_which_other_shapes_would_explain_much(nats: fl
         assert decision.winner is REFITTED and decision.share(found) == 0 and "shape" in decision.why[id(found)]
 
 
+@pytest.mark.parametrize(("nats", "verdict"), [(25.0, "cause"), (39.0, "cause"), (41.0, "undecided")])
+def test_of_a_small_effect_other_shapes_gain_more_than_a_share_before_noise_is_ruled_out(nats: float, verdict: str):
+    found = trial(1200.0, 0.0, "coulomb")  # it gains 200 nats
+    decision = decide(GIVEN, REFITTED, [found], lambda t: None, lambda t: nats, periods=100.0)
+    assert decision.verdict == verdict
+
+
 @pytest.mark.parametrize(("nats", "verdict"), [(40.0, "cause"), (60.0, "undecided")])
 def test_the_second_of_two_effects_must_gain_more_than_other_shapes_would(nats: float, verdict: str):
     # The pair gains 8000 nats, its second effect 1000 of them.
@@ -102,7 +109,9 @@ def test_a_second_effect_is_looked_for_where_more_is_left_than_chance_leaves(lef
     assert something_left([refitted, best], refitted, lambda t: 0.0, imposed=False) == worth
 
 
-@pytest.mark.parametrize(("nats", "worth"), [(400.0, False), (500.0, True)])
-def test_a_second_effect_is_looked_for_where_little_is_left_but_other_shapes_would_explain_much(nats, worth: bool):
-    refitted, best = trial(0.0, 1.0), trial(9000.0, 3e-4, "coulomb")
+@pytest.mark.parametrize(
+    ("gained", "nats", "worth"), [(9000.0, 400.0, False), (9000.0, 500.0, True), (100.0, 15.0, False)]
+)
+def test_a_second_effect_is_looked_for_where_little_is_left_but_other_shapes_would_explain_much(gained, nats, worth):
+    refitted, best = trial(0.0, 1.0), trial(gained, 3e-4, "coulomb")
     assert something_left([refitted, best], refitted, lambda t: nats, imposed=False) == worth

@@ -34,7 +34,8 @@ _NEARLY_ALL, _MUCH = 0.8, 0.1
 _ALMOST_ALL = 0.95
 """A law that explains this share of the excess along an imposed motion stands, whatever a map makes of the rest."""
 _UNFIT = 20.0
-"""Nats that laws of other shapes must gain beside a cause, beyond chance, for it not to be named,"""
+"""Nats that laws of other shapes must gain beside a cause, beyond chance, for it to be doubted; twice as many, for it
+not to be named,"""
 _UNFIT_SHARE = {1: 0.1, 2: 0.05}
 """and share of the nats that its last effect gains, of one effect or two: two together stand for many a single law."""
 _UNFIT_OF_WHITE = 0.005
@@ -88,7 +89,8 @@ def something_left(
     if adequate(best) or (imposed and _almost_all(best, refitted)):
         return False
     if best.prediction.left < NEGLIGIBLE:
-        return bool(best.effects) and lack_of_fit(best) > _UNFIT_SHARE[2] * (best.evidence - refitted.evidence)
+        gained = best.evidence - refitted.evidence
+        return bool(best.effects) and lack_of_fit(best) > max(_UNFIT_SHARE[2] * gained, _UNFIT)
     return bool(np.all(best.prediction.beyond >= _WORTH_A_SECOND**2 * refitted.prediction.error))
 
 
@@ -240,7 +242,7 @@ def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
 def _doubt(winner: Trial, gained: float, nats: float) -> float:
     """How far laws of other shapes gain beside the winner, whose last effect gained so many nats; above 1: too much."""
     share = _UNFIT_OF_WHITE if white(winner) else _UNFIT_SHARE[len(winner.effects)]
-    return max(nats - _UNFIT, 0.0) / max(share * gained - _UNFIT, 1e-9)
+    return max(nats - _UNFIT, 0.0) / max(share * gained - _UNFIT, _UNFIT)
 
 
 def _verdict(given: Trial, refitted: Trial, winner: Trial, tried: Sequence[Trial], mapped: Trial | None) -> str:
