@@ -110,6 +110,21 @@ def test_the_verdict_is_written_as_json_and_as_a_page(hidden_cubic, tmp_path):
     assert "http" not in page.replace("http://www.w3.org", "")
 
 
+def test_what_shows_only_in_the_part_that_was_kept_back_is_named_from_there():
+    whole = made(linear, samples=1000, seed=5)
+    assert whole.displacement is not None
+    gap = 1.05 * np.max(np.abs(whole.displacement[:700]))
+
+    def stopped(x, v):
+        return linear(x, v) + 60.0 * np.sign(x) * np.maximum(np.abs(x) - gap, 0.0)
+
+    record = made(stopped, samples=1000, seed=5)
+    d = jfsm.diagnose(record, jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING), causes=("end_stop", "cubic_hardening"))
+    assert [f.cause for f in d.findings] == ["end_stop"]
+    assert d.findings[0].parameters["gap"].value == pytest.approx(gap, rel=0.05)
+    assert any("last part" in note for note in d.notes) and d.gain is not None
+
+
 def test_a_cause_that_makes_held_out_runs_worse_is_not_named(believed, monkeypatch):
     worse = Gain(before=0.1, refitted=0.1, after=0.2, floor=0.01, channels={})
     monkeypatch.setattr("jfsm.diagnosis._diagnose.measure_gain", lambda *arguments: (worse, []))

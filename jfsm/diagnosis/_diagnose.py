@@ -10,13 +10,13 @@ import numpy as np
 
 from .._types import require_x64
 from ..dynamics import Reconstruction
-from ..identification import prepare_all
+from ..identification import Nuisances, prepare_all
 from ..records import Record
 from ..structures import AccelerationGain, Cause, ForceGain, Structure
 from ._candidates import Candidate, candidates, chosen_causes, promising
 from ._chance import beside_chance, noise_levels
 from ._clipped import beside_clipping, limited
-from ._decide import decide, something_left, strained
+from ._decide import NEGLIGIBLE, decide, something_left, strained, white
 from ._detectable import also_detectable
 from ._diagnosis import Diagnosis
 from ._effect import Effect
@@ -30,6 +30,7 @@ from ._trial import Trial
 _HEAVIER = 0.03
 _WORSE = 1.5
 """Error on held-out readings, in errors of the model as given, from which a cause makes the model worse."""
+_LATER = "What the model lacks shows in the last part only: that was fitted, and the gain is that of the first part."
 Progress = Callable[[str, int, int], None]
 
 
@@ -89,22 +90,20 @@ def diagnose(
     training, held = split(record, holdout)
     chosen = chosen_causes(causes)
     whole = [whole for whole, _ in training]
-    until = [fit for _, fit in training]
     clipped = limited(whole, model) if "clipping" in chosen else []
     stated = model
     for sensor in clipped:
         model = model + sensor
-    records = prepare_all(whole, model, reconstruction)
-    every = candidates(model, records, chosen, places)
-    tried, left_out = promising(every)
     steps = _Steps(progress, 4)
 
     steps.next("the model as given and refitted")
-    given, refitted = fit_model(model, records, until)
-    if _outweighed(model, refitted.structure):
-        # The noise of the force acts through the mass, and all hypotheses share one noise: that of the likelier mass.
-        records = prepare_all(whole, model, reconstruction, weighed=refitted.structure)
-        given, refitted = fit_model(model, records, until, near=refitted.structure)
+    records, until, given, refitted = _believed(training, model, reconstruction)
+    if held and isinstance(holdout, float) and _later(given):
+        # What shows only in the part that was kept back has to be fitted; as much is kept back of the first part.
+        training, held = split(record, holdout, first=True)
+        records, until, given, refitted = _believed(training, model, reconstruction)
+    every = candidates(model, records, chosen, places)
+    tried, left_out = promising(every)
     imposed = records[0].path is not None
     trials, behind = search(tried, model, given, refitted, records, until, steps.next)
     given, refitted, *trials = beside_chance([given, refitted, *trials], model, records, until, key)
@@ -151,6 +150,26 @@ def diagnose(
     return assemble(decision, clipped, refitted, tested, model, extended, records, missing, gain, runs)
 
 
+def _believed(
+    training: Sequence[tuple[Record, int]], model: Structure, reconstruction: Reconstruction
+) -> tuple[list[Nuisances], list[int], Trial, Trial]:
+    """Records as the likelihood sees them, how many samples of each are fitted, the model as given, and refitted."""
+    whole, until = [whole for whole, _ in training], [fit for _, fit in training]
+    records = prepare_all(whole, model, reconstruction)
+    given, refitted = fit_model(model, records, until)
+    if _outweighed(model, refitted.structure):
+        # The noise of the force acts through the mass, and all hypotheses share one noise: that of the likelier mass.
+        records = prepare_all(whole, model, reconstruction, weighed=refitted.structure)
+        given, refitted = fit_model(model, records, until, near=refitted.structure)
+    return records, until, given, refitted
+
+
+def _later(given: Trial) -> bool:
+    """Whether the model as given leaves nothing of what was fitted, but much of what was kept back."""
+    fitted, kept_back = (np.sqrt(given.prediction.beyond[first::2]) for first in (0, 1))
+    return white(given) and bool(np.all(fitted < NEGLIGIBLE) and np.any(kept_back > NEGLIGIBLE))
+
+
 def _beside(
     alone: list[Trial], refitted: Trial, every: list[Candidate], lack: Callable[[Trial], float], *, imposed: bool
 ) -> list[Effect]:
@@ -181,8 +200,13 @@ class _Steps:
         self.done += 1
 
 
-def split(record: Record | Sequence[Record], holdout) -> tuple[list[tuple[Record, int]], list[Record]]:
-    """Records with the number of their samples that are fitted, and the records on which the gain is measured."""
+def split(
+    record: Record | Sequence[Record], holdout, first: bool = False
+) -> tuple[list[tuple[Record, int]], list[Record]]:
+    """Records with the number of their samples that are fitted, and the records on which the gain is measured.
+
+    Of a share that is held back, the samples belong to the records and are predicted, or with `first` are not seen.
+    """
     records = [record] if isinstance(record, Record) else list(record)
     if not records:
         raise ValueError("`record` must hold at least one record; the sequence is empty.")
@@ -198,6 +222,10 @@ def split(record: Record | Sequence[Record], holdout) -> tuple[list[tuple[Record
             raise ValueError(
                 f"`holdout` as a share must lie between 0 and 1, e.g. 0.3; got {holdout}. None keeps nothing back."
             )
+        if first:
+            begins = [int(round(holdout * len(r))) for r in records]
+            later = [r[begin:].noted(_LATER) for r, begin in zip(records, begins, strict=True)]
+            return [(r, len(r)) for r in later], [r[:begin] for r, begin in zip(records, begins, strict=True)]
         ends = [int(round((1 - holdout) * len(r))) for r in records]
         return list(zip(records, ends, strict=True)), [r[end:] for r, end in zip(records, ends, strict=True)]
     return [(r, len(r)) for r in records], list(holdout)
