@@ -10,6 +10,7 @@ import jfsm
 from jfsm.diagnosis._decide import decide, something_left
 from jfsm.diagnosis._effect import Effect
 from jfsm.diagnosis._trial import Prediction
+from jfsm.identification import Unknown
 
 NOISE = 1e-4
 
@@ -23,6 +24,7 @@ def trial(evidence: float, power: float, *causes: str) -> Any:
         effects=tuple(Effect(jfsm.structures.causes()[cause], (0, 1)) for cause in causes),
         laws=(),
         unknowns=(),
+        theta=np.zeros(0),
         structure=SimpleNamespace(terms=()),
         whiteness=0.0 if power == 0 else 0.4,
         noise=np.zeros(1),
@@ -84,6 +86,19 @@ def test_no_cause_is_named_beside_which_other_shapes_would_explain_much(nats: fl
     assert decision.verdict == verdict
     if verdict == "undecided":
         assert decision.winner is REFITTED and decision.share(found) == 0 and "shape" in decision.why[id(found)]
+
+
+@pytest.mark.parametrize(
+    ("theta", "refit", "verdict"), [(-3.9, 0.1, "undecided"), (-3.8, 0.1, "cause"), (-3.9, -3.9, "cause")]
+)
+def test_no_cause_is_named_beside_an_own_value_that_went_as_far_as_it_may(theta: float, refit: float, verdict: str):
+    damping = Unknown("damping@0-1.c", 0.0, 1.0, True, 0.0, 0.2, degrees=4.0, low=-3.9, high=3.9)
+    found, refitted = trial(9000.0, 0.0, "coulomb"), trial(1000.0, 0.1)
+    for t, value in ((found, theta), (refitted, refit)):
+        t.unknowns, t.theta = (damping,), np.array([value])
+    decision = decide(GIVEN, refitted, [found], lambda t: None, lambda t: 0.0, periods=100.0)
+    assert decision.verdict == verdict
+    assert ("damping@0-1.c" in decision.why[id(found)]) == (verdict == "undecided")
 
 
 @pytest.mark.parametrize(("nats", "verdict"), [(25.0, "cause"), (39.0, "cause"), (41.0, "undecided")])

@@ -40,6 +40,8 @@ _UNFIT_SHARE = {1: 0.1, 2: 0.05}
 """and share of the nats that its last effect gains, of one effect or two: two together stand for many a single law."""
 _UNFIT_OF_WHITE = 0.005
 """The same where innovations are white: all else is right then."""
+_NEAR = 0.01
+"""Distance to the farthest own value, as a share of it, from which a value is there."""
 _WHITE = 0.1
 _SCALE = 0.5
 _LOOKS = (10.0, 40.0)
@@ -102,6 +104,15 @@ def strained(trials: Sequence[Trial]) -> bool:
         if math.isfinite(u.degrees):  # of an own value
             cost += prior([u], np.array([theta]))[0] - prior([u], np.array([u.center]))[0]
     return bool(best.effects) and cost > SIGNIFICANT
+
+
+def far_off(trial: Trial) -> set[str]:
+    """Own values of a trial that went as far as they may: it is another structure's force that they make up for."""
+    return {
+        u.path
+        for u, theta in zip(trial.unknowns, trial.theta, strict=True)
+        if math.isfinite(u.degrees) and not u.low + _NEAR < theta < u.high - _NEAR
+    }
 
 
 def explained(trial: Trial, baseline: Trial) -> float:
@@ -207,6 +218,8 @@ def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
         springs = [s for s in t.structure.terms if isinstance(s, LinearStiffness) and set(s.at) == set(law.at)]
         if other := law.otherwise(sum(float(s.k) for s in springs)):
             return other
+    if far := far_off(t) - far_off(refitted):
+        return f"takes {' and '.join(sorted(far))} as far from what the model states as they may be"
     # A gain error and own values that are all off by the same share predict the same readings: only what is believed
     # beforehand weighs them, so such a candidate need not beat the refit by a margin, nor leave less.
     same = not t.laws and adequate(t) and adequate(refitted)
