@@ -110,6 +110,21 @@ def test_the_verdict_is_written_as_json_and_as_a_page(hidden_cubic, tmp_path):
     assert "http" not in page.replace("http://www.w3.org", "")
 
 
+def test_a_buckled_spring_is_told_from_a_quadratic_one_by_accelerations_alone():
+    well = np.sqrt(2 * STIFFNESS / CUBIC)
+
+    def buckled(x, v):  # about one of its wells
+        return DAMPING * v - 2 * STIFFNESS * (x + well) + CUBIC * (x + well) ** 3
+
+    rest = made(buckled, channels=("acceleration",), noise=0.01)
+    record = jfsm.Record(rest.time, rest.force, acceleration=rest.acceleration)
+    model = jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING)
+    d = jfsm.diagnose(record, model, causes=("quadratic_stiffness", "double_well"), max_causes=1, key=jax.random.key(1))
+    assert [f.cause for f in d.findings] == ["double_well"]
+    assert d.findings[0].parameters["k_neg"].value == pytest.approx(3 * STIFFNESS, rel=0.1)
+    assert d.findings[0].parameters["k3"].value == pytest.approx(CUBIC, rel=0.1)
+
+
 def test_what_shows_only_in_the_part_that_was_kept_back_is_named_from_there():
     whole = made(linear, samples=1000, seed=5)
     assert whole.displacement is not None

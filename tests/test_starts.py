@@ -11,7 +11,8 @@ from scipy.integrate import solve_ivp
 import jfsm
 from jfsm.dynamics import lower
 from jfsm.dynamics._along import force_along
-from jfsm.identification import missing_force, place, prepare, scale_of, starts
+from jfsm.dynamics._start import starting_state
+from jfsm.identification import about_a_rest, missing_force, place, prepare, scale_of, starts
 
 T = np.arange(1200) * 0.06
 MODEL = jfsm.Structure.sdof(1.0, 9.0, 0.3)
@@ -63,6 +64,30 @@ def test_a_buckled_spring_is_placed_although_the_motion_stays_small_within_one_w
     assert found["double_well@0-1.k_neg"] > 9.0
     middle = np.sqrt((found["double_well@0-1.k_neg"] - 9.0) / found["double_well@0-1.k3"])
     assert middle == pytest.approx(1.0, rel=0.3)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_buckled_spring_is_placed_in_its_well_although_no_channel_tells_where_that_is(side: float):
+    def decay(t, y):
+        return [y[1], -9.0 * y[0] - 0.3 * y[1] + 15.0 * y[0] - 6.0 * y[0] ** 3]
+
+    x, v = solve_ivp(decay, (0, T[300]), [side * 1.3, 0.0], t_eval=T[:300], rtol=1e-9, atol=1e-12).y
+    a = -9.0 * x - 0.3 * v + 15.0 * x - 6.0 * x**3
+    assert np.all(side * x > 0.5)
+    r = jfsm.Record(T[:300], acceleration=a + 0.005 * np.std(a) * np.random.default_rng(5).standard_normal(300))
+    found = about_a_rest(jfsm.DoubleWell, (0, 1), missing_force(MODEL, prepare(r, MODEL)), MODEL)
+    assert found is not None
+    placed, rest = found
+    assert 0.5 < side * rest < 2.0 and placed.share is not None and placed.share > 0.2
+    assert placed.term.values[0] == pytest.approx(15.0, rel=0.3)
+    right = MODEL + jfsm.DoubleWell(15.0, 6.0, at=(0, 1))
+    x0, v0 = starting_state(right, r)
+    assert x0[0] == pytest.approx(side * 1.3, rel=0.02) and abs(v0[0]) < 0.05
+
+
+def test_a_law_without_a_rest_of_its_own_is_not_placed_about_one():
+    r = record(lambda x, v: 3.0 * x**3)
+    assert about_a_rest(jfsm.CubicStiffness, (0, 1), missing_force(MODEL, prepare(r, MODEL)), MODEL) is None
 
 
 def test_a_law_that_shows_at_the_first_peaks_only_is_placed():

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import compress, product, zip_longest
+from itertools import product, zip_longest
 
 from ..estimation import Latent
 from ..identification import (
@@ -14,6 +14,7 @@ from ..identification import (
     Nuisances,
     Placed,
     Unknown,
+    about_a_rest,
     effect_unknown,
     lanes_of,
     missing_force,
@@ -65,7 +66,7 @@ class Candidate:
 
     `share` is how much of the missing force the best of them explains by regression; None where regression cannot tell,
     as of sensors, which lack no force. A law that no shape of which explains any has no starts. `own` holds the model's
-    own values to begin with, where they are not tried as given.
+    own values to begin with, where they are not tried as given, and where the motion begins if that is known.
     """
 
     effects: tuple[Effect, ...]
@@ -115,7 +116,8 @@ def candidates(
             spots = dict.fromkeys(c for n in records for c in n.record.channels if c[0] in kinds)
             found += [Candidate((Effect(cause, at),), natural_starts(model, cause, at, records[0])) for at in spots]
         else:
-            found += [laws.candidate(Effect(cause, (i, j))) for i, j in (model.links if places is None else places)]
+            for at in model.links if places is None else places:
+                found += [laws.candidate(Effect(cause, at)), *laws.about_a_rest(Effect(cause, at))]
     return found
 
 
@@ -123,8 +125,9 @@ def promising(tried: Sequence[Candidate]) -> tuple[list[Candidate], list[Candida
     """Candidates that are worth a fit, and those that are not: laws that explain least of the missing force."""
     ranked = sorted((c.share for c in tried if c.share is not None), reverse=True)
     least = ranked[_FOLLOWED - 1] if len(ranked) > _FOLLOWED else -math.inf
-    chosen = [bool(c.starts) and (c.share is None or c.share >= least) for c in tried]
-    return list(compress(tried, chosen)), list(compress(tried, [not c for c in chosen]))
+    chosen = [c for c in tried if c.starts and (c.share is None or c.share >= least)]
+    fitted = {c.effects for c in chosen}
+    return chosen, [c for c in tried if c.effects not in fitted]
 
 
 class Laws:
@@ -150,6 +153,19 @@ class Laws:
             natural = natural_starts(self.structure, *effect, self.nuisances)
             starts += natural[: min(SHAPES, lanes_of(natural[0])) - len(starts)]
         return Candidate((effect,), tuple(starts), placed[0].share if placed else 0.0)
+
+    def about_a_rest(self, effect: Effect) -> list[Candidate]:
+        """A law that may rest elsewhere than at zero, beginning there, where no channel tells where the motion is."""
+        seen = self.nuisances
+        known = seen.at_rest or seen.path is not None or any(kind == "displacement" for kind, _ in seen.channels)
+        if known or self.structure.dof > 1:
+            return []
+        found = about_a_rest(effect.cause.effect, effect.at, self.missing, self.structure)
+        if found is None:
+            return []
+        placed, rest = found
+        begin = rest if effect.at == (0, 1) else -rest
+        return [Candidate((effect,), (self.structure + placed.term,), placed.share, {"x0@1": begin})]
 
 
 def _shows(effect: type, kind: str, records: Sequence[Nuisances]) -> bool:
@@ -185,6 +201,11 @@ def modest(candidate: Candidate, model: Structure, nuisances: Nuisances) -> Stru
     return model + cause.effect(**{name: size[name] * value for name, value in shape.items()}, at=at)
 
 
+def begun(start: Unknown, value: float) -> Unknown:
+    """The start of a motion, believed to be elsewhere."""
+    return replace(start, theta=value / start.unit, center=value / start.unit)
+
+
 def own_paths(model: Structure, records: Sequence[Nuisances]) -> tuple[str, ...]:
     """The model's own values that a refit may change.
 
@@ -207,7 +228,7 @@ def hypothesis(
 ) -> Hypothesis:
     """Starts with their unknowns: the model's own values, the effect's numbers, and each record's nuisances.
 
-    `begins` holds the own values of each start, where they differ from the model's.
+    `begins` holds the own values of each start, where they differ from the model's, and where the motion begins.
     """
     structures, unknowns = [], []
     trust = dict(model.trust)
@@ -220,10 +241,11 @@ def hypothesis(
         mine: list[Unknown] = [own_unknown(structure, p, trust, degrees) for p in own]
         if begin is not None:
             stated = structure.values()
-            mine = [replace(u, theta=math.log(begin[u.path] / stated[u.path])) for u in mine]
+            mine = [replace(u, theta=math.log(begin.get(u.path, stated[u.path]) / stated[u.path])) for u in mine]
         mine += [effect_unknown(structure, p, records[0]) for p in effect]
         for index, nuisances in enumerate(records):
-            mine += nuisance_unknowns(structure, nuisances, index)
+            theirs = nuisance_unknowns(structure, nuisances, index)
+            mine += [begun(u, begin[u.path]) if begin and u.path in begin else u for u in theirs]
         structures.append(structure)
         unknowns.append(tuple(mine))
     return Hypothesis(tuple(structures), tuple(unknowns))

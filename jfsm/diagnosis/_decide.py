@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..identification import prior
-from ..structures import AbstractTerm, LinearStiffness
+from ..structures import AbstractTerm
 from ._trial import Trial
 
 GATE = 0.5
@@ -215,8 +215,7 @@ def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
     if not math.isfinite(t.evidence) or over_refit == -math.inf:
         return "its motion runs away"
     for law in t.laws:
-        springs = [s for s in t.structure.terms if isinstance(s, LinearStiffness) and set(s.at) == set(law.at)]
-        if other := law.otherwise(sum(float(s.k) for s in springs)):
+        if other := law.otherwise(t.structure.stiffness_of(law.at)):
             return other
     if far := far_off(t) - far_off(refitted):
         return f"takes {' and '.join(sorted(far))} as far from what the model states as they may be"

@@ -14,7 +14,7 @@ from ..structures import Structure
 from ._drive import Reconstruction
 from ._excitation import bucket, excitation, substeps_for, typical_speed
 from ._grid import free_run
-from ._plant import Grid, lower, readout
+from ._plant import Channel, Grid, lower, readout
 
 _ITERATIONS = 12
 
@@ -70,9 +70,28 @@ def _least_squares(model: Structure, head: Record, reconstruction: Reconstructio
         if kind in ("displacement", "velocity"):
             state[(j - 1) + (model.dof if kind == "velocity" else 0)] = offset[0, i]
     readings = jnp.asarray(np.pad(y, ((0, padded - len(head)), (0, 0))))
+    known = plant, show, fine, readings, jnp.asarray(spread), counted
+    _, state = min((_descended(known, begin) for begin in (state, *_rests(model, channels))), key=lambda end: end[0])
+    return state[: model.dof], state[model.dof :]
+
+
+def _rests(model: Structure, channels: tuple[Channel, ...]) -> list[np.ndarray]:
+    """States of rest away from zero, of masses that a law holds there and whose displacement is not measured."""
+    found = []
+    for law in model.terms:
+        ground, j = sorted(law.at)
+        if ground == 0 and ("displacement", j) not in channels:
+            for rest in law.rests(model.stiffness_of(law.at)):
+                found.append(np.where(np.arange(2 * model.dof) == j - 1, rest, 0.0))
+    return found
+
+
+def _descended(known: tuple, state: np.ndarray) -> tuple[float, np.ndarray]:
+    """Guarded Gauss-Newton steps from a state: the cost at their end, and the state there."""
+    plant, show, fine, readings, spread, counted = known
     damp, best = 1e-6, None
     for _ in range(_ITERATIONS):
-        residual, slope = _residuals(plant, show, fine, readings, jnp.asarray(spread), counted, jnp.asarray(state))
+        residual, slope = _residuals(plant, show, fine, readings, spread, counted, jnp.asarray(state))
         residual, slope = np.asarray(residual), np.asarray(slope)
         cost = float(residual @ residual) if np.all(np.isfinite(residual)) else np.inf
         if best is None or cost < best[0]:
@@ -90,7 +109,7 @@ def _least_squares(model: Structure, head: Record, reconstruction: Reconstructio
         step = np.linalg.lstsq(normal + damp * np.diag(np.diag(normal)), -slope.T @ residual, rcond=None)[0]
         state = best[1] + step
     assert best is not None
-    return best[1][: model.dof], best[1][model.dof :]
+    return best[:2]
 
 
 @eqx.filter_jit

@@ -216,6 +216,28 @@ def place(
     return found
 
 
+def about_a_rest(
+    kind: type[AbstractTerm], at: tuple[int, int], latent: Latent, structure: Structure
+) -> tuple[Placed, float] | None:
+    """A term that makes a missing force about a rest of its own, and where that is; None where it has no rest.
+
+    For motion of which no channel tells where it is: the smoothed one is about zero.
+    """
+    row = direction(at, latent.force.shape[1])
+    d, w, missing = latent.displacement @ row, latent.velocity @ row, latent.force @ row
+    columns = np.stack([np.ones_like(d), w / max(np.std(w), 1e-300), d / np.std(d), (d / np.std(d)) ** 2], 1)
+    straight = np.linalg.lstsq(columns[:, :3], missing, rcond=None)[0]
+    sizes = np.linalg.lstsq(columns, missing, rcond=None)[0]
+    slope, curvature = sizes[2] / np.std(d), sizes[3] / np.var(d)
+    stiffness = structure.stiffness_of(at)
+    numbers = kind.about_a_rest(stiffness, slope, curvature)
+    if numbers is None:
+        return None
+    term = kind(**numbers, at=at)
+    before, left = (float(np.mean((missing - columns[:, : len(q)] @ q) ** 2)) for q in (straight, sizes))
+    return Placed(term, 1.0 - left / before, left), max(term.rests(stiffness), key=lambda rest: rest * curvature)
+
+
 def _numbers(law: AbstractTerm, scale: Scale, sides: bool) -> list[dict[str, float]]:
     """Natural shapes of a law; a side that was chosen stays, and so does the origin of time."""
     if sides:

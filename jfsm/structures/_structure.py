@@ -164,6 +164,10 @@ class Structure(eqx.Module):
         """Places that already carry a term, in the order of their first term."""
         return tuple(dict.fromkeys(term.at for term in self.terms))
 
+    def stiffness_of(self, link: tuple[int, int]) -> float:
+        """Stiffness of all linear springs of a link together."""
+        return sum(float(t.k) for t in self.terms if isinstance(t, LinearStiffness) and set(t.at) == set(link))
+
     def __add__(self, other: AbstractTerm | AbstractSensor) -> "Structure":
         if isinstance(other, AbstractTerm):
             return Structure(self.mass, (*self.terms, other), self.sensors, self.trust)

@@ -154,6 +154,18 @@ class AbstractTerm(eqx.Module):
         """Why these numbers, beside so much linear stiffness of the link, make it another law; empty if they do not."""
         return ""
 
+    def rests(self, stiffness: float) -> tuple[float, ...]:
+        """Relative displacements, other than none, at which it may rest beside so much linear stiffness of the link."""
+        return ()
+
+    @classmethod
+    def about_a_rest(cls, stiffness: float, slope: float, curvature: float) -> Numbers | None:
+        """Numbers whose force is a constant + slope·d + curvature·d² for small d from a rest of its own, if it has any.
+
+        The rest is one beside so much linear stiffness of the link.
+        """
+        return None
+
     @classmethod
     def shapes(cls, scale: Scale) -> list[Numbers]:
         """Sets of numbers to begin a search from, each with a force of the elastic one's size.

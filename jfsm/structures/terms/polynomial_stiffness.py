@@ -1,5 +1,7 @@
 """Springs that are powers of the displacement."""
 
+import math
+
 import equinox as eqx
 import jax.numpy as jnp
 
@@ -72,6 +74,19 @@ class DoubleWell(AbstractTerm):
 
     def otherwise(self, stiffness):
         return "" if self.k_neg > stiffness else "takes less stiffness than there is: one well, not two"
+
+    def rests(self, stiffness):
+        well = math.sqrt(max(float(self.k_neg) - stiffness, 0.0) / float(self.k3))
+        return (well, -well) if well > 0 else ()
+
+    @classmethod
+    def about_a_rest(cls, stiffness, slope, curvature):
+        if slope + stiffness <= 0 or curvature == 0:
+            return None
+        # At r = ±√((k_neg - k) / k3) the slope is 3 k3 r² - k_neg = 2 k3 r² - k, and half the second derivative 3 k3 r.
+        stiffening = (slope + stiffness) / 2  # k3 r²
+        rest = 3 * stiffening / curvature
+        return {"k_neg": stiffness + stiffening, "k3": stiffening / rest**2}
 
     @classmethod
     def shapes(cls, scale):
