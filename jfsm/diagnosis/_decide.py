@@ -107,12 +107,13 @@ def strained(trials: Sequence[Trial]) -> bool:
 
 
 def far_off(trial: Trial) -> set[str]:
-    """Own values of a trial that went as far as they may: it is another structure's force that they make up for."""
-    return {
-        u.path
-        for u, theta in zip(trial.unknowns, trial.theta, strict=True)
-        if math.isfinite(u.degrees) and not u.low + _NEAR < theta < u.high - _NEAR
-    }
+    """Own values of a trial that went as far as they may: it is another structure's force that they make up for.
+
+    Damping may go: a model without friction often states as viscous what friction takes.
+    """
+    own = [(u, theta) for u, theta in zip(trial.unknowns, trial.theta, strict=True) if math.isfinite(u.degrees)]
+    low = {u.path for u, theta in own if theta < u.low + _NEAR and not u.path.startswith("damping@")}
+    return low | {u.path for u, theta in own if theta > u.high - _NEAR}
 
 
 def explained(trial: Trial, baseline: Trial) -> float:

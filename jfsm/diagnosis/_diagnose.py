@@ -58,7 +58,8 @@ def diagnose(
     model : Structure
         The simulation that its owner believes in. Its own values are refitted within its trust (`Structure.uncertain`).
     holdout : float, Record, sequence of Records, or None
-        A share is the last part in time; records are never fitted; None decides on the whole record and gives no gain.
+        A share is the last part in time, unless what the model lacks shows only there: then it is the first. Records
+        are never fitted; None decides on the whole record and gives no gain.
     causes : sequence of ids or causes, optional
         What to look for; the whole catalogue by default. Wrong own values always. Of many laws, those are fitted that
         explain most of the force that the model lacks.

@@ -231,11 +231,12 @@ def about_a_rest(
     slope, curvature = sizes[2] / np.std(d), sizes[3] / np.var(d)
     stiffness = structure.stiffness_of(at)
     numbers = kind.about_a_rest(stiffness, slope, curvature)
-    if numbers is None:
+    term = None if numbers is None else kind(**numbers, at=at)
+    rests = () if term is None else term.rests(stiffness)
+    if term is None or not rests:
         return None
-    term = kind(**numbers, at=at)
     before, left = (float(np.mean((missing - columns[:, : len(q)] @ q) ** 2)) for q in (straight, sizes))
-    return Placed(term, 1.0 - left / before, left), max(term.rests(stiffness), key=lambda rest: rest * curvature)
+    return Placed(term, 1.0 - left / before, left), max(rests, key=lambda rest: rest * curvature)
 
 
 def _numbers(law: AbstractTerm, scale: Scale, sides: bool) -> list[dict[str, float]]:

@@ -76,7 +76,8 @@ class DoubleWell(AbstractTerm):
         return "" if self.k_neg > stiffness else "takes less stiffness than there is: one well, not two"
 
     def rests(self, stiffness):
-        well = math.sqrt(max(float(self.k_neg) - stiffness, 0.0) / float(self.k3))
+        depth, k3 = float(self.k_neg) - stiffness, float(self.k3)
+        well = math.sqrt(depth / k3) if depth > 0 and k3 > 0 else 0.0
         return (well, -well) if well > 0 else ()
 
     @classmethod
