@@ -3,7 +3,8 @@
     python benchmarks/blind.py --n 100 --seed 1 --jobs 2 --noise 0.001 0.01 --out results.jsonl
 
 One line of JSON per challenge is appended to the file as it is done; the same call goes on where it was stopped. With
-`--two`, two effects of different families are hidden at once; with `--outside`, one that no catalogue names.
+`--two`, two effects of different families are hidden at once; with `--outside`, one that no catalogue names; with
+`--dirt`, records are as a laboratory has them: coloured noise, steps, outliers, drift, half a sample of delay.
 """
 
 import argparse
@@ -21,8 +22,9 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.blind_table import Row, exact, hidden, said, table  # noqa: E402  (needs the line above when run as a script)
-from tests.blind import CAUSES, OUTSIDE, PAIRS, Challenge, draw, draw_two  # noqa: E402
+from tests.blind import CAUSES, DIRT, OUTSIDE, PAIRS, Challenge, draw, draw_two, soiled  # noqa: E402
 from tests.blind.challenge import CHANNEL_SETS, NOISE_LEVELS  # noqa: E402
+from tests.blind.dirt import TAKEN_FOR  # noqa: E402
 from tests.blind.drives import DRIVES  # noqa: E402
 
 HOLDOUT = 0.3
@@ -51,8 +53,11 @@ def examine(seed: int, drawing: Drawing) -> Row:
 
 
 def drawn(seed: int, drawing: Drawing) -> Challenge:
-    """The challenge of a seed; with "two" in the drawing, of two of its causes."""
+    """The challenge of a seed; with "two" in the drawing, of two of its causes, and with "dirt" soiled by it."""
     arguments = dict(drawing)
+    dirt = arguments.pop("dirt", None)
+    if dirt is not None:
+        return soiled(drawn(seed, arguments), dirt)
     if not arguments.pop("two", False):
         return draw(seed, **arguments)
     causes = set(arguments.pop("causes"))
@@ -191,6 +196,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     parser.add_argument("--two", action="store_true", help="hide two of the causes at once")
     parser.add_argument("--outside", action="store_true", help="hide effects that are not in the catalogue instead")
+    parser.add_argument("--dirt", choices=list(DIRT), help="what comes on the records besides white noise")
     parser.add_argument("--channels", nargs="+", default=list(CHANNEL_SETS), choices=list(CHANNEL_SETS))
     parser.add_argument("--excitation", nargs="+", default=list(DRIVES), choices=list(DRIVES))
     parser.add_argument("--out", type=Path, help="file of JSON lines to append to and to resume from")
@@ -200,6 +206,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         drawing["causes"] = list(OUTSIDE)
     if given.two:  # not said otherwise, so that files of one effect can be gone on with
         drawing["two"] = True
+    if given.dirt:
+        drawing["dirt"] = given.dirt
+        drawing["causes"] = [cause for cause in drawing["causes"] if cause not in TAKEN_FOR.get(given.dirt, ())]
     rows = run(range(given.seed, given.seed + given.n), drawing, given.jobs, given.out, lambda s: print(s, flush=True))
     if rows:
         print("\n" + table(sorted(rows, key=lambda row: row["seed"])))

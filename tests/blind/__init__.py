@@ -9,6 +9,8 @@ from .challenge import FIRST_CAUSES as FIRST_CAUSES
 from .challenge import Challenge as Challenge
 from .challenge import Effect as Effect
 from .challenge import draw as draw
+from .dirt import DIRT as DIRT
+from .dirt import soiled as soiled
 from .laws import OUTSIDE as OUTSIDE
 from .two import PAIRS as PAIRS
 from .two import draw_two as draw_two
