@@ -44,6 +44,42 @@ def test_the_first_start_is_near_the_truth_wherever_the_search_stood():
     assert {p: v for p, v in best.items() if "end_stop" not in p} == MODEL.values()
 
 
+def timed(force) -> jfsm.Record:
+    """A record with a force that depends on time and displacement, known by all channels."""
+
+    def motion(t, y):
+        return [y[1], drive(t) - 9.0 * y[0] - 0.3 * y[1] - force(t, y[0])]
+
+    x, v = solve_ivp(motion, (0, T[-1]), [0.0, 0.0], t_eval=T, rtol=1e-9, atol=1e-12).y
+    rng = np.random.default_rng(9)
+    noisy = [y + 0.01 * np.std(y) * rng.standard_normal(T.size) for y in (drive(T), x, v)]
+    return jfsm.Record(T, noisy[0], noisy[1], noisy[2], at_rest=True)
+
+
+@pytest.mark.parametrize("phase", [0.7, 2.4, 3.9, 5.6])
+@pytest.mark.parametrize("term", [
+    jfsm.PeriodicDisturbance(1.0, 1.0, 0.0, at=(0, 1)), jfsm.ParametricStiffness(1.0, 1.0, 0.0, at=(0, 1)),
+], ids=["load", "pulsating spring"])  # fmt: skip
+def test_what_comes_and_goes_is_placed_in_whatever_phase(term, phase: float):
+    load, omega = isinstance(term, jfsm.PeriodicDisturbance), 1.733
+    r = timed(lambda t, x: (-1.2 if load else 1.2 * x) * np.cos(omega * t + phase))
+    best = starts(MODEL + term, prepare(r, MODEL + term))[0].terms[-1]
+    size, *found = (float(number) for number in best.values)
+    assert size == pytest.approx(1.2, rel=0.2)
+    assert np.corrcoef(np.cos(omega * T + phase), np.cos(found[0] * T + found[1]))[0, 1] > 0.9
+
+
+def test_a_shape_between_those_of_the_grid_is_found():
+    law = jfsm.EndStop(1.0, 1.0, at=(0, 1))
+    r = record(lambda x, v: 12.0 * np.sign(x) * np.maximum(np.abs(x) - 0.83, 0.0))
+    prepared = prepare(r, MODEL)
+    scale = scale_of(prepared, MODEL)
+    grid = np.array([shape["gap"] for shape in jfsm.EndStop.shapes(scale)])
+    best, *others = place(law, missing_force(MODEL, prepared), MODEL, scale, prepared)
+    assert best.term.values[1] not in grid and all(other.term.values[1] in grid for other in others)
+    assert abs(float(best.term.values[1]) - 0.83) < np.min(np.abs(grid - 0.83))
+
+
 def test_two_laws_are_placed_beside_each_other():
     r = record(lambda x, v: 3.0 * x**3 + 0.5 * v * np.abs(v))
     wrong = MODEL + jfsm.CubicStiffness(0.1, at=(0, 1)) + jfsm.QuadraticDamping(0.01, at=(0, 1))
@@ -179,3 +215,11 @@ def test_shapes_too_stiff_for_the_samples_leave_the_others_to_begin_from():
     bristles = MODEL + jfsm.LuGre(1.0, 1.0, 0.3, 50.0, 1.0, at=(0, 1))
     first = starts(bristles, prepare(coarse, bristles))[0].values()
     assert first["lugre@0-1.F"] == pytest.approx(1.0, rel=0.5)
+
+
+def test_a_law_of_which_every_shape_runs_away_is_not_placed(monkeypatch):
+    r = record(lambda x, v: 3.0 * x**3)
+    prepared, law = prepare(r, MODEL), jfsm.CubicStiffness(1.0, at=(0, 1))
+    latent, scale = missing_force(MODEL, prepared), scale_of(prepared, MODEL)
+    monkeypatch.setattr(jfsm.CubicStiffness, "force", lambda self, d, w, z, t: self.k3 * jnp.inf * d)
+    assert place(law, latent, MODEL, scale, prepared) == []

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product, zip_longest
 
+import equinox as eqx
+
 from ..estimation import Latent
 from ..identification import (
     DEGREES,
@@ -33,6 +35,7 @@ from ..structures import (
     ChannelDelay,
     CoulombAsymmetric,
     ForceGain,
+    PeriodicDisturbance,
     Preload,
     Structure,
     causes,
@@ -149,10 +152,24 @@ class Laws:
     def candidate(self, effect: Effect) -> Candidate:
         placed = self.placed(effect)
         starts = [self.structure + start.term for start in placed[:SHAPES] if start.share is not None]
+        starts += [self.structure + term for term in self._otherwise_directed(placed)]
         if len(effect.cause.effect.parameters) == 1:  # an ill seen missing force may not show its size
             natural = natural_starts(self.structure, *effect, self.nuisances)
             starts += natural[: min(SHAPES, lanes_of(natural[0])) - len(starts)]
         return Candidate((effect,), tuple(starts), placed[0].share if placed else 0.0)
+
+    def _otherwise_directed(self, placed: Sequence[Placed]) -> list[AbstractTerm]:
+        """The best shape with its sign changed, of a load whose force and motion nothing but an acceleration tells."""
+        if not placed or self._seen or not isinstance(placed[0].term, PeriodicDisturbance):
+            return []
+        term = placed[0].term
+        return [eqx.tree_at(lambda t: t.phase, term, term.phase + math.pi)]
+
+    @property
+    def _seen(self) -> bool:
+        """Whether anything tells where the motion is."""
+        seen = self.nuisances
+        return seen.path is not None or any(kind == "displacement" for kind, _ in seen.channels)
 
     def about_a_rest(self, effect: Effect) -> list[Candidate]:
         """A law that may rest elsewhere than at zero, beginning there, where no channel tells where the motion is."""

@@ -6,7 +6,9 @@ and the offsets. It is equation error, good for a start and for nothing more.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import compress
 from typing import NamedTuple
 
@@ -14,6 +16,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from scipy.stats import qmc
 
 from ..dynamics._along import force_along
 from ..dynamics._imposed import Imposed
@@ -28,6 +31,10 @@ _AT_ONCE = 16
 """Shapes evaluated in one call; a short list is filled up, so that one program serves all."""
 _ALIKE = 0.98
 """Correlation of two forces from which they are one start."""
+_MOST = 8
+"""Shapes that come back."""
+_SHRINK = (1.0, 0.4, 0.16, 0.064)
+"""Rounds in which the best shape is looked for between those that were tried, so many gaps of their grid wide."""
 _SPRING, _DASHPOT, _CONSTANT = 0.15, 1.0, 10.0
 """How far springs and dashpots may be off, as shares of themselves, and a constant force as a share of the missing."""
 _CORRELATED = 20.0
@@ -164,56 +171,158 @@ def place(
     `sign` asks for that sign of the first number; a side stays as it is unless `sides` are to be tried. None are found
     where the missing force is no number.
     """
-    kind, n = type(law), len(latent.force)
-    time = jnp.asarray(nuisances.record.time[:n])
-    motion = (jnp.asarray(latent.displacement), jnp.asarray(latent.velocity), time)
-    # At rest friction is anything within its limits, and all else is noise.
-    moves = latent.moves if np.any(latent.moves) else np.ones(n, bool)
-    missing = latent.force[moves]
-    if not np.all(np.abs(missing) < _NO_FORCE):
-        return []  # a hidden state of the structure's own runs away along this motion
-    spread = np.maximum(missing.std(0), 1e-300)
     rows = _numbers(law, scale, sides)
-    forces = np.concatenate([_forces(law, lot, structure, motion, len(chunk)) for chunk, lot in _lots(kind, rows)])
-    beside = [np.asarray(force_along(lower(Structure(structure.mass, [t])), *motion)) for t in others]
-    stable = np.max(np.abs(forces), (1, 2)) < _RUN_AWAY * np.max(spread)  # false for what is no number, too
-    forces, rows = forces[stable][:, moves], list(compress(rows, stable))
+    regression = _Regression.of(law, latent, structure, nuisances, others)
+    if regression is None:
+        return []  # a hidden state of the structure's own runs away along this motion
+    columns, rows = regression.columns(rows)
     if not rows:
         return []
-    basis, doubt = _basis(latent, structure, beside)
-    basis = (basis[moves] / spread[:, None]).reshape(-1, len(doubt))
-    wanted = (missing / spread).ravel()
-    columns = (forces / spread).reshape(len(rows), -1)
-    left, beside_all, _, own = _regressed(columns, wanted, basis)
-    if np.all(np.sum(own**2, 1) < _ALMOST_NONE * np.sum(columns**2, 1)):
+    if regression.linear(columns):
         return [Placed(law, None, math.inf)]
-    # Springs and dashpots are known to some extent: without that, a law that is partly linear has no size of its own.
-    noise = np.sqrt(_CORRELATED * max(np.min(left @ left - beside_all), 1e-12 * wanted.size) / wanted.size)
-    ridge = np.diag(noise / doubt)
-    columns = np.hstack([columns, np.zeros((len(columns), len(ridge)))])
-    left, gain, size, columns = _regressed(
-        columns, np.concatenate([wanted, np.zeros(len(ridge))]), np.vstack([basis, ridge])
-    )
-    power, power_left = (
-        np.maximum(np.sum(columns**2, 1), 1e-300),
-        float(left @ left / len(missing) * np.mean(spread**2)),
-    )
-    one_sign = all(p.positive for p in kind.parameters if p.force)
-    usable = power > 1e-12 * wanted.size
-    usable &= (size if one_sign else np.abs(size)) * np.sqrt(np.mean(forces**2, (1, 2))) > _LEAST * scale.force
-    if sign:
-        usable &= np.array([np.sign(s * next(iter(row.values()))) == sign for s, row in zip(size, rows, strict=True)])
-    found, kept = [], []
-    for k in np.argsort(-np.where(usable, gain, -np.inf)):
-        if not usable[k] or len(found) == 8:
+    regression = regression.with_doubt(columns)
+    ranked = regression.ranked(columns, rows, sign, scale)
+    grid = {p.name: np.unique([row[p.name] for row in rows]) for p in law.parameters if p.free and not p.force}
+    grid = {name: values for name, values in grid.items() if values.size > 1}
+    found: list[_Shape] = []
+    for shape in ranked:
+        if len(found) == _MOST:
             break
-        shape = columns[k] / np.sqrt(power[k])
-        if all(abs(shape @ other) < _ALIKE for other in kept):
-            kept.append(shape)
-            numbers = {p.name: rows[k][p.name] * (size[k] if p.force else 1.0) for p in kind.parameters}
-            share = float(gain[k] / (left @ left))
-            found.append(Placed(kind(**numbers, at=law.at), share, (1 - share) * power_left))
-    return found
+        if all(shape.differs(other) for other in found):
+            found.append(shape if found else regression.polished(shape, grid, sign, scale))
+    return [Placed(type(law)(**shape.numbers, at=law.at), shape.share, shape.left) for shape in found]
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """Numbers of a law with their size by regression; what it explains of the missing force, and what its force is."""
+
+    row: dict[str, float]
+    numbers: dict[str, float]
+    share: float
+    left: float
+    force: np.ndarray
+
+    def differs(self, other: "_Shape") -> bool:
+        """Whether the two forces are not much alike."""
+        return abs(float(self.force @ other.force)) < _ALIKE
+
+
+@dataclass(frozen=True)
+class _Regression:
+    """A missing force regressed on those of a law, beside errors of springs, dashpots and constants, and other laws.
+
+    `ridge` holds how well those are known: without that, a law that is partly linear has no size of its own.
+    """
+
+    law: AbstractTerm
+    structure: Structure
+    motion: tuple[jax.Array, jax.Array, jax.Array]
+    moves: np.ndarray
+    missing: np.ndarray
+    spread: np.ndarray
+    basis: np.ndarray
+    doubt: np.ndarray
+    ridge: np.ndarray
+
+    @classmethod
+    def of(
+        cls,
+        law: AbstractTerm,
+        latent: Latent,
+        structure: Structure,
+        nuisances: Nuisances,
+        others: Sequence[AbstractTerm],
+    ) -> "_Regression | None":
+        """None where the missing force is no number."""
+        n = len(latent.force)
+        motion = jnp.asarray(latent.displacement), jnp.asarray(latent.velocity), jnp.asarray(nuisances.record.time[:n])
+        # At rest friction is anything within its limits, and all else is noise.
+        moves = latent.moves if np.any(latent.moves) else np.ones(n, bool)
+        missing = latent.force[moves]
+        if not np.all(np.abs(missing) < _NO_FORCE):
+            return None
+        spread = np.maximum(missing.std(0), 1e-300)
+        beside = [np.asarray(force_along(lower(Structure(structure.mass, [t])), *motion)) for t in others]
+        basis, doubt = _basis(latent, structure, beside)
+        basis = (basis[moves] / spread[:, None]).reshape(-1, len(doubt))
+        return cls(law, structure, motion, moves, missing, spread, basis, doubt, np.zeros((0, len(doubt))))
+
+    @property
+    def wanted(self) -> np.ndarray:
+        return np.concatenate([(self.missing / self.spread).ravel(), np.zeros(len(self.ridge))])
+
+    @cached_property
+    def projector(self) -> np.ndarray:
+        """Orthonormal basis of what else may be off."""
+        return np.linalg.qr(np.vstack([self.basis, self.ridge]))[0]
+
+    def columns(self, rows: list[dict[str, float]]) -> tuple[np.ndarray, list[dict[str, float]]]:
+        """Forces (rows, samples x dof) of those shapes that do not run away along the motion, and these."""
+        kind = type(self.law)
+        lots = list(_lots(kind, rows))
+        forces = np.concatenate([_forces(self.law, lot, self.structure, self.motion, len(some)) for some, lot in lots])
+        stable = np.max(np.abs(forces), (1, 2)) < _RUN_AWAY * np.max(self.spread)  # false for what is no number, too
+        rows = list(compress(rows, stable))
+        return (forces[stable][:, self.moves] / self.spread).reshape(len(rows), self.missing.size), rows
+
+    def linear(self, columns: np.ndarray) -> bool:
+        """Whether springs, dashpots and constants make all of these forces, so that regression cannot tell."""
+        own = _regressed(columns, self.wanted, self.projector)[3]
+        return bool(np.all(np.sum(own**2, 1) < _ALMOST_NONE * np.sum(columns**2, 1)))
+
+    def with_doubt(self, columns: np.ndarray) -> "_Regression":
+        """The regression with its ridge, from what the best of these forces leaves."""
+        wanted = self.wanted
+        left, gain, _, _ = _regressed(columns, wanted, self.projector)
+        rest = max(np.min(left @ left - gain), 1e-12 * wanted.size)
+        return replace(self, ridge=np.diag(np.sqrt(_CORRELATED * rest / wanted.size) / self.doubt))
+
+    def ranked(self, columns: np.ndarray, rows: list[dict[str, float]], sign: int, scale: Scale) -> Iterator[_Shape]:
+        """Shapes that may be used, those first that explain most."""
+        kind, wanted = type(self.law), self.wanted
+        rms = np.sqrt(np.mean((columns.reshape(*columns.shape[:1], *self.missing.shape) * self.spread) ** 2, (1, 2)))
+        padded = np.hstack([columns, np.zeros((len(columns), len(self.ridge)))])
+        left, gain, size, padded = _regressed(padded, wanted, self.projector)
+        power = np.maximum(np.sum(padded**2, 1), 1e-300)
+        one_sign = all(p.positive for p in kind.parameters if p.force)
+        opposite = [kind.opposite(row) if one_sign and s < 0 else None for row, s in zip(rows, size, strict=True)]
+        rows = [row if other is None else other for row, other in zip(rows, opposite, strict=True)]
+        size = np.where([other is None for other in opposite], size, -size)
+        usable = power > 1e-12 * self.missing.size
+        usable &= (size if one_sign else np.abs(size)) * rms > _LEAST * scale.force
+        if sign:
+            first = np.array([next(iter(row.values())) for row in rows])
+            usable &= np.sign(size * first) == sign
+        total = float(left @ left)
+        mean = total / len(self.missing) * float(np.mean(self.spread**2))
+        for k in np.argsort(-np.where(usable, gain, -np.inf)):
+            if usable[k]:
+                share = float(gain[k]) / total
+                numbers = {p.name: rows[k][p.name] * (size[k] if p.force else 1.0) for p in kind.parameters}
+                yield _Shape(rows[k], numbers, share, (1 - share) * mean, padded[k] / np.sqrt(power[k]))
+
+    def polished(self, shape: _Shape, grid: Mapping[str, np.ndarray], sign: int, scale: Scale) -> _Shape:
+        """The shape that explains most between those of the `grid` next to this one."""
+        if not grid:
+            return shape
+        around = [_neighbours(values, shape.row[name]) for name, values in grid.items()]
+        low, high = np.array(around).T
+        offsets = (2.0 * qmc.Sobol(len(grid), scramble=False).random(_AT_ONCE) - 1.0) * (high - low) / 2
+        for shrink in _SHRINK:
+            centre = np.array([shape.row[name] for name in grid])
+            points = np.clip(centre + shrink * offsets, low, high)
+            rows = [shape.row | dict(zip(grid, point.tolist(), strict=True)) for point in points]
+            shape = max([shape, *self.ranked(*self.columns(rows), sign, scale)], key=lambda s: s.share)
+        return shape
+
+
+def _neighbours(values: np.ndarray, value: float) -> tuple[float, float]:
+    """The values of a grid next to one of its own; past an end, as far off as on its other side."""
+    k = int(np.argmin(np.abs(values - value)))
+    if k == 0:
+        return max(2 * value - values[1], value / 2) if value > 0 else 2 * value - values[1], values[1]
+    return values[k - 1], values[k + 1] if k + 1 < values.size else 2 * value - values[k - 1]
 
 
 def about_a_rest(
@@ -281,9 +390,9 @@ def _along_each(plant: Plant, name: str, numbers, x, v, time):
     return jax.vmap(one)(numbers)
 
 
-def _regressed(columns: np.ndarray, wanted: np.ndarray, basis: np.ndarray):
-    """What the basis leaves of `wanted`, how much of its square each column takes, with what factor; columns left."""
-    q = np.linalg.qr(basis)[0]
+def _regressed(columns: np.ndarray, wanted: np.ndarray, q: np.ndarray):
+    """What an orthonormal basis leaves of `wanted`, how much of its square each column takes, with what factor; columns
+    left."""
     wanted = wanted - q @ (q.T @ wanted)
     columns = columns - (columns @ q) @ q.T
     power = np.maximum(np.sum(columns**2, 1), 1e-300)

@@ -174,6 +174,11 @@ class AbstractTerm(eqx.Module):
         """
         return [{p.name: scale.of(p) for p in cls.parameters}]
 
+    @classmethod
+    def opposite(cls, numbers: Numbers) -> Numbers | None:
+        """Numbers whose force is that of these with its sign changed, of a law that has them."""
+        return None
+
     @property
     def place(self) -> str:
         """The link as it stands in a path, ``0-1``."""

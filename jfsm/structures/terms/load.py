@@ -39,6 +39,10 @@ class PeriodicDisturbance(AbstractTerm):
         return -self.F * jnp.cos(self.omega * t + self.phase)
 
     @classmethod
+    def opposite(cls, numbers):
+        return numbers | {"phase": numbers["phase"] - np.copysign(np.pi, numbers["phase"])}
+
+    @classmethod
     def shapes(cls, scale):
         return [
             {"F": scale.force, "omega": o, "phase": phase}

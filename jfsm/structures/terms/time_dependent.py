@@ -94,6 +94,10 @@ class ParametricStiffness(AbstractTerm):
         return self.dk * jnp.cos(self.omega * t + self.phase) * d
 
     @classmethod
+    def opposite(cls, numbers):
+        return numbers | {"phase": numbers["phase"] - np.copysign(np.pi, numbers["phase"])}
+
+    @classmethod
     def shapes(cls, scale):
         dk = scale.force / scale.length
         return [{"dk": dk, "omega": o, "phase": phase} for o in lines(scale, 0.05, 3.0) for phase in (0.0, np.pi / 2)]
