@@ -137,3 +137,11 @@ def test_a_second_effect_is_looked_for_where_more_is_left_than_chance_leaves(lef
 def test_a_second_effect_is_looked_for_where_little_is_left_but_other_shapes_would_explain_much(gained, nats, worth):
     refitted, best = trial(0.0, 1.0), trial(gained, 3e-4, "coulomb")
     assert something_left([refitted, best], refitted, lambda t: nats, imposed=False) == worth
+
+
+def test_a_prediction_whose_filter_says_it_knows_nothing_explains_nothing():
+    refitted = Prediction(np.array([0.01, 0.003]), np.full(2, 1e-6), np.full(2, 1e-7))
+    lost = Prediction(np.array([1e-6, 0.0029]), np.array([1e-6, 1e3]), np.array([1e-7, 1e2]))
+    assert lost.left == 0.0 and lost.beside(refitted).left > 0.02
+    known = Prediction(np.array([1e-6, 2e-6]), np.full(2, 2e-6), np.full(2, 1e-7))
+    assert known.beside(refitted).left == known.left == 0.0

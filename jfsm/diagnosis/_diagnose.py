@@ -21,6 +21,7 @@ from ._detectable import also_detectable
 from ._diagnosis import Diagnosis
 from ._effect import Effect
 from ._gain import Gain, measure_gain
+from ._holdout import split
 from ._lack_of_fit import lack_of_fit
 from ._report import Tested, assemble
 from ._residual import residual, stand_in
@@ -30,7 +31,6 @@ from ._trial import Trial
 _HEAVIER = 0.03
 _WORSE = 1.5
 """Error on held-out readings, in errors of the model as given, from which a cause makes the model worse."""
-_LATER = "What the model lacks shows in the last part only: that was fitted, and the gain is that of the first part."
 Progress = Callable[[str, int, int], None]
 
 
@@ -58,8 +58,9 @@ def diagnose(
     model : Structure
         The simulation that its owner believes in. Its own values are refitted within its trust (`Structure.uncertain`).
     holdout : float, Record, sequence of Records, or None
-        A share is the last part in time, unless what the model lacks shows only there: then it is the first. Records
-        are never fitted; None decides on the whole record and gives no gain.
+        A share is the last part in time, unless what the model lacks shows only there: then it is the first. Where
+        nothing drives the structure it is the last part of what is more than noise, run from the release. Records are
+        never fitted; None decides on the whole record and gives no gain.
     causes : sequence of ids or causes, optional
         What to look for; the whole catalogue by default. Wrong own values always. Of many laws, those are fitted that
         explain most of the force that the model lacks.
@@ -99,7 +100,7 @@ def diagnose(
 
     steps.next("the model as given and refitted")
     records, until, given, refitted = _believed(training, model, reconstruction)
-    if held and isinstance(holdout, float) and _later(given):
+    if held and isinstance(holdout, float) and _later(refitted):
         # What shows only in the part that was kept back has to be fitted; as much is kept back of the first part.
         training, held = split(record, holdout, first=True)
         records, until, given, refitted = _believed(training, model, reconstruction)
@@ -107,12 +108,14 @@ def diagnose(
     tried, left_out = promising(every)
     imposed = records[0].path is not None
     trials, behind = search(tried, model, given, refitted, records, until, steps.next)
+    trials = [t.beside(refitted) for t in trials]
     given, refitted, *trials = beside_chance([given, refitted, *trials], model, records, until, key)
     lack = partial(lack_of_fit, records=records, until=until)
     effects = _beside([given, refitted, *trials], refitted, every, lack, imposed=imposed) if max_causes > 1 else []
     if effects:
         found = search_pairs(effects, trials, model, refitted, records, until, steps.next)
-        every_trial, behind = [given, refitted, *trials, *found.trials], behind + found.behind
+        together = [t.beside(refitted) for t in found.trials]
+        every_trial, behind = [given, refitted, *trials, *together], behind + found.behind
         given, refitted, *trials = beside_chance(every_trial, model, records, until, key)
     steps.next("the verdict")
     periods = sum(n.record.duration for n in records) * records[0].omega / (2 * math.pi)
@@ -165,10 +168,10 @@ def _believed(
     return records, until, given, refitted
 
 
-def _later(given: Trial) -> bool:
-    """Whether the model as given leaves nothing of what was fitted, but much of what was kept back."""
-    fitted, kept_back = (np.sqrt(given.prediction.beyond[first::2]) for first in (0, 1))
-    return white(given) and bool(np.all(fitted < NEGLIGIBLE) and np.any(kept_back > NEGLIGIBLE))
+def _later(refitted: Trial) -> bool:
+    """Whether own values alone leave nothing of what was fitted, but much of what was kept back."""
+    fitted, kept_back = (np.sqrt(refitted.prediction.beyond[first::2]) for first in (0, 1))
+    return white(refitted) and bool(np.all(fitted < NEGLIGIBLE) and np.any(kept_back > NEGLIGIBLE))
 
 
 def _beside(
@@ -199,34 +202,3 @@ class _Steps:
         if self.progress is not None:
             self.progress(what, self.done, self.total)
         self.done += 1
-
-
-def split(
-    record: Record | Sequence[Record], holdout, first: bool = False
-) -> tuple[list[tuple[Record, int]], list[Record]]:
-    """Records with the number of their samples that are fitted, and the records on which the gain is measured.
-
-    Of a share that is held back, the samples belong to the records and are predicted, or with `first` are not seen.
-    """
-    records = [record] if isinstance(record, Record) else list(record)
-    if not records:
-        raise ValueError("`record` must hold at least one record; the sequence is empty.")
-    for item in records:
-        if not isinstance(item, Record):
-            raise TypeError(f"`record` must be a jfsm.Record or a sequence of them; got {type(item).__name__}.")
-    if holdout is None:
-        return [(r, len(r)) for r in records], []
-    if isinstance(holdout, Record):
-        return [(r, len(r)) for r in records], [holdout]
-    if isinstance(holdout, int | float):
-        if not 0 < holdout < 1:
-            raise ValueError(
-                f"`holdout` as a share must lie between 0 and 1, e.g. 0.3; got {holdout}. None keeps nothing back."
-            )
-        if first:
-            begins = [int(round(holdout * len(r))) for r in records]
-            later = [r[begin:].noted(_LATER) for r, begin in zip(records, begins, strict=True)]
-            return [(r, len(r)) for r in later], [r[:begin] for r, begin in zip(records, begins, strict=True)]
-        ends = [int(round((1 - holdout) * len(r))) for r in records]
-        return list(zip(records, ends, strict=True)), [r[end:] for r, end in zip(records, ends, strict=True)]
-    return [(r, len(r)) for r in records], list(holdout)

@@ -1,7 +1,7 @@
 """What mending the model is worth: free runs, or forces of an imposed motion, on readings that took no part."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from ..dynamics import Reconstruction, simulate
 from ..records import Record
 from ..structures import Structure
+from ._holdout import HeldOut
 
 _PERIODS = 2.0
 """Periods, at least, from which the state of a held-out run is estimated; they are not counted."""
@@ -55,12 +56,15 @@ class Gain:
 
     @property
     def closed(self) -> float:
-        """Share of the closable error that is closed: (before - after) / (before - floor)."""
+        """Share of the closable error that is closed: (before - after) / (before - floor), at most 1.
+
+        0 where there was nothing to close.
+        """
         return _closed(self.before, self.after, self.floor)
 
 
 def _closed(before: float, after: float, floor: float) -> float:
-    return (before - after) / (before - floor) if before > _CLOSABLE * floor else 0.0
+    return min((before - after) / (before - floor), 1.0) if before > _CLOSABLE * floor else 0.0
 
 
 def window_for(record: Record, omega: float) -> int:
@@ -72,13 +76,13 @@ def measure_gain(
     given: Structure,
     refitted: Structure,
     extended: Structure,
-    records: list[Record],
+    held: Sequence[HeldOut],
     noise: Mapping[tuple, float],
     omega: float,
     reconstruction: Reconstruction,
     key: jax.Array,
 ) -> tuple[Gain, list[dict]]:
-    """Gain on held-out records, and per record the curves behind it (measured, before, after).
+    """Gain on what was held out, and per record the curves behind it (measured, before, after).
 
     `noise` is the standard deviation of each channel's noise.
     """
@@ -87,22 +91,22 @@ def measure_gain(
         name: {} for name in ("before", "refitted", "after", "floor", "spread")
     }
     curves = []
-    for record in records:
+    for record, begin in ((part.record, part.begin) for part in held):
         window = window_for(record, omega)
-        counted = _counted(record, window)
+        counted = _counted(record, max(window, begin))
         runs = {
             name: _run(model, record, window, reconstruction)
             for name, model in (("before", given), ("refitted", refitted), ("after", extended))
         }
-        left = _noise(extended, record, window, reconstruction, runs["after"], noise, seed)
+        left = _noise(extended, record, window, counted, reconstruction, runs["after"], noise, seed)
         for channel, y in record.answers.items():
             for name, run in runs.items():
                 squares[name].setdefault(channel, []).append(float(np.mean((run[channel][counted] - y[counted]) ** 2)))
             squares["floor"].setdefault(channel, []).append(left[channel])
-            squares["spread"].setdefault(channel, []).append(float(np.var(y)))
-        curves.append({"record": record, **runs})
+            squares["spread"].setdefault(channel, []).append(float(np.var(y[begin:])))
+        curves.append({"record": record[begin:], **{name: _from(begin, run) for name, run in runs.items()}})
     rms = {name: {c: math.sqrt(float(np.mean(v))) for c, v in table.items()} for name, table in squares.items()}
-    units = records[0].units
+    units = held[0].record.units
     channels = {
         f"{kind} {j}": ChannelGain(
             units[kind], rms["spread"][kind, j], *(rms[n][kind, j] for n in ("before", "refitted", "after", "floor"))
@@ -123,13 +127,17 @@ def _run(model: Structure, record: Record, window: int, reconstruction: Reconstr
     return {c: np.concatenate([y, np.full(len(record) - y.size, y[-1] if y.size else 0.0)]) for c, y in shown.items()}
 
 
-def _counted(record: Record, window: int) -> slice:
+def _from(begin: int, run: Mapping[tuple, np.ndarray]) -> dict[tuple, np.ndarray]:
+    return {channel: y[begin:] for channel, y in run.items()}
+
+
+def _counted(record: Record, begin: int) -> slice:
     """Samples on which a gain is measured; of an imposed motion not the last ones, where its rate is hardly known."""
-    return slice(window, len(record) - len(record) // _END if record.drive == "motion" else None)
+    return slice(begin, len(record) - len(record) // _END if record.drive == "motion" else None)
 
 
 def _noise(
-    model, record: Record, window: int, reconstruction, run, levels: Mapping[tuple, float], rng
+    model, record: Record, window: int, counted: slice, reconstruction, run, levels: Mapping[tuple, float], rng
 ) -> dict[tuple, float]:
     """Mean square error that noise alone leaves, per channel: its readings', its drive's and its start's."""
     total = {c: 0.0 for c in record.answers}
@@ -138,7 +146,7 @@ def _noise(
         truth = {c: run[c] if c in run else y for c, y in record.channels.items()}
         again = _run(model, remeasured(record, truth, levels, rng), window, reconstruction)
         for c in total:
-            total[c] += float(np.mean((again[c] - run[c])[_counted(record, window)] ** 2)) / _DRAWS
+            total[c] += float(np.mean((again[c] - run[c])[counted] ** 2)) / _DRAWS
     return {c: total[c] + levels.get(c, 0.0) ** 2 for c in total}
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,10 @@ _CHANCE = 2.0
 """Standard deviations by which noise may leave more than it does in the mean."""
 _SLACKS = (0.0, 0.01, 0.05)
 """How loosely the state may be held while it is filtered; each hypothesis is judged by its best."""
+_LOST = 0.05
+"""Share of a baseline's error that noise may leave of a prediction, whatever its filter says."""
+_ENOUGH = 900
+"""Samples from which a lag-one correlation is told as it is: chance then leaves a thirtieth."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,14 @@ class Prediction:
     def left(self) -> float:
         """What is left beyond noise and chance, as a share of the signal; of the worst set."""
         return math.sqrt(float(np.max(self.beyond)))
+
+    def beside(self, baseline: "Prediction") -> "Prediction":
+        """The same, with no more left to noise than twice what it leaves of a baseline, or a share of that one's error.
+
+        A filter that says it does not know where the motion is, as where a law's slope has no bounds, predicts nothing.
+        """
+        most = np.maximum(2 * baseline.expected, _LOST * baseline.error)
+        return Prediction(self.error, np.minimum(self.expected, most), np.minimum(self.scatter, most))
 
 
 @dataclass(frozen=True)
@@ -108,6 +120,10 @@ class Trial:
     def extended(self) -> Structure:
         """The structure without the offsets that are not significant."""
         return without_small_offsets(self.structure, self.unknowns, self.theta, self.covariance)
+
+    def beside(self, baseline: "Trial") -> "Trial":
+        """The same, its prediction judged beside that of a baseline."""
+        return replace(self, prediction=self.prediction.beside(baseline.prediction))
 
     def interval(self, path: str, width: float = 1.96) -> tuple[float, float, float]:
         """Value, low and high of an unknown; symmetric in its own coordinate."""
@@ -179,14 +195,18 @@ def _windows(nuisances: Nuisances) -> tuple[np.ndarray, np.ndarray]:
 
 
 def whiteness(posterior: Posterior, theta: np.ndarray) -> float:
-    """Largest lag-one correlation of the innovations of any channel over the samples that were fitted."""
+    """Largest lag-one correlation of the innovations of any channel over the samples that were fitted.
+
+    Of few samples it is made smaller, as chance is larger there.
+    """
     worst = 0.0
     for index, nuisances in enumerate(posterior.records):
         found = posterior.innovations(theta, index)
         counted = slice(1, posterior.until[index])
         alive = (np.asarray(nuisances.readings.use)[counted] > 0) & (found.variance[counted] > 0)
         r = np.where(alive, found.error[counted] / np.sqrt(np.where(alive, found.variance[counted], 1.0)), 0.0)
-        worst = max(worst, float(np.max(np.abs(np.sum(r[1:] * r[:-1], 0) / np.maximum(np.sum(r * r, 0), 1e-300)))))
+        correlation = np.abs(np.sum(r[1:] * r[:-1], 0) / np.maximum(np.sum(r * r, 0), 1e-300))
+        worst = max(worst, float(np.max(correlation)) * min(1.0, math.sqrt(len(r) / _ENOUGH)))
     return worst
 
 

@@ -168,6 +168,12 @@ class Record:
         return self._drive
 
     @property
+    def driven(self) -> bool:
+        """Whether a force, a moving base or an imposed motion drives the structure; it was released otherwise."""
+        forces = (y for (kind, _), y in self.channels.items() if kind == "force")
+        return self.drive == "motion" or self.base_acceleration is not None or any(np.any(y) for y in forces)
+
+    @property
     def name(self) -> str | None:
         """What the record is called in a report."""
         return self._name

@@ -1,0 +1,43 @@
+"""What is fitted and what is held out."""
+
+import numpy as np
+import pytest
+
+import jfsm
+from jfsm.diagnosis._holdout import split
+
+T = np.arange(2000) * 0.01
+RNG = np.random.default_rng(3)
+
+
+def released(rate: float, noise: float = 0.01) -> jfsm.Record:
+    x = np.exp(-rate * T) * np.cos(12.0 * T) + 0.5
+    return jfsm.Record(T, displacement=x + noise * RNG.standard_normal(T.size))
+
+
+@pytest.mark.parametrize("rate", [0.5, 1.0])
+def test_of_a_released_structure_the_last_part_of_its_motion_is_held_out_and_run_from_the_release(rate: float):
+    record = released(rate)
+    ((fitted, until),), (held,) = split(record, 0.3)
+    dies = np.log(1.0 / 0.01) / rate  # the envelope sinks to the noise
+    assert fitted is record and until == pytest.approx(0.7 * dies / 0.01, rel=0.25)
+    assert held.begin == until and len(held.record) == pytest.approx(until / 0.7, abs=2)
+
+
+def test_of_a_released_structure_that_never_stops_the_last_part_is_held_out():
+    ((_, until),), (held,) = split(released(0.0), 0.3)
+    assert (until, held.begin, len(held.record)) == (1400, 1400, 2000)
+
+
+def test_a_driven_structure_begins_anew_where_it_was_held_out():
+    force = np.cos(3.0 * T)
+    record = jfsm.Record(T, force, np.exp(-2.0 * T) + 0.01 * RNG.standard_normal(T.size))
+    ((_, until),), (held,) = split(record, 0.3)
+    assert (until, held.begin, len(held.record)) == (1400, 0, 600)
+    assert held.record.time[0] == T[1400]
+
+
+def test_the_first_part_held_out_is_not_seen():
+    ((fitted, until),), (held,) = split(released(1.0), 0.25, first=True)
+    assert (len(fitted), until, len(held.record), held.begin) == (1500, 1500, 500, 0)
+    assert "shows in the last part only" in fitted.notes[-1]
