@@ -21,6 +21,7 @@ import typer
 if TYPE_CHECKING:
     import jax
 
+    from .diagnosis import Diagnosis
     from .records import Record
     from .structures import Structure
 
@@ -237,6 +238,9 @@ def diagnose(
         list[str] | None, typer.Option(help="Look for this cause (`jfsm causes` lists them); repeat for more.")
     ] = None,
     max_causes: Annotated[int, typer.Option(help="Effects that may act at once: 1, or 2.", min=1, max=2)] = 2,
+    what_next: Annotated[
+        bool, typer.Option("--next", help="Also say what test would tell the two likeliest causes apart.")
+    ] = False,
     key: Seed = None,
 ) -> None:
     """Say what a model gets wrong about a record, why, and what mending it is worth."""
@@ -254,6 +258,8 @@ def diagnose(
     if extended is not None:
         d.extended.save(extended)
     d.print()  # last, so that a reader who closes the pipe loses no file
+    if what_next:
+        _say_what_next(d, _key(key))
     if d.verdict != "consistent":
         raise typer.Exit(FOUND)
 
@@ -402,6 +408,20 @@ def _progress() -> Iterator[Callable[[str, int, int], None]]:
             bar.update(task, description=what, completed=done, total=total)
 
         yield tell
+
+
+def _say_what_next(d: "Diagnosis", key: "jax.Array | None") -> None:
+    """Tests that would tell the two likeliest causes apart, as a table."""
+    with _progress() as tell:
+        found = d.next_tests(key, tell)
+    if not found:
+        typer.echo("There are no two causes that a test could tell apart.")
+        return
+    rows = [(f"{p.nats:.0f}", f"x {p.reach:.2g}", p.what) for p in found]
+    one, other = found[0].rivals
+    _table(f"What to measure next, to tell {one} from {other}", ("nats", "response", "test"), rows)
+    if not found[0].tells:
+        typer.echo("None of them would.")
 
 
 def _table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

@@ -19,6 +19,7 @@ from typer.testing import CliRunner, Result
 
 from jfsm import Polynomial, Record, Structure, load_map, read
 from jfsm.cli import app
+from jfsm.diagnosis import Proposal
 
 MASS, STIFFNESS, DAMPING = 2.0, 1800.0, 3.0
 RATE, SAMPLES = 100.0, 500
@@ -200,6 +201,25 @@ def test_a_bar_is_shown_on_a_terminal_only(channels, folder, monkeypatch):
     shown = run("diagnose", *channels, "--model", folder / "model.toml")
     assert "1/4" in shown.stderr and "looking" in shown.stderr
     assert shown.stdout == "verdict: consistent\n"
+
+
+@pytest.mark.parametrize(("nats", "last"), [(28.0, None), (2.0, "None of them would."), (None, "no two causes")])
+def test_what_to_measure_next_is_said_after_the_verdict(nats, last, channels, folder, monkeypatch):
+    record, rivals = read(*channels[:1], force="u", displacement="y"), ("coulomb", "lugre")
+    tests = [] if nats is None else [
+        Proposal("the same force at 2 times the size", nats, 1.87, rivals, record),
+        Proposal("the same force at 0.5 times the size", -1.0, 0.5, rivals, record),
+    ]  # fmt: skip
+    d = FakeDiagnosis(verdict="cause", next_tests=lambda key, progress: tests)
+    monkeypatch.setattr("jfsm.diagnosis.diagnose", lambda *arguments, **options: d)
+    result = run("diagnose", *channels, "--model", folder / "model.toml", "--next")
+    assert (result.exit_code, result.stderr) == (1, "")
+    verdict, *lines = result.stdout.splitlines()
+    assert verdict == "verdict: cause" and (nats is None) == ("coulomb from lugre" not in result.stdout)
+    if nats is not None:
+        (row,) = [line.split() for line in lines if "2 times" in line]
+        assert row[:4] == [f"{nats:.0f}", "x", "1.9", "the"]
+    assert last is None or last in lines[-1]
 
 
 def test_an_interrupted_diagnosis_says_so_and_leaves_no_file(channels, folder, tmp_path, monkeypatch):

@@ -6,3 +6,4 @@ from ._diagnosis import Estimate as Estimate
 from ._diagnosis import Finding as Finding
 from ._map_force import MappedForce as MappedForce
 from ._map_force import map_force as map_force
+from ._next import Proposal as Proposal

@@ -23,6 +23,7 @@ from ._effect import Effect
 from ._gain import Gain, measure_gain
 from ._holdout import split
 from ._lack_of_fit import lack_of_fit
+from ._next import Leading
 from ._report import Tested, assemble
 from ._residual import residual, stand_in
 from ._search import fit_model, search, search_pairs
@@ -151,7 +152,8 @@ def diagnose(
         laws = [c for c in tried if c.effects in dropped and not c.effects[0].cause.is_sensor]
         unseen = also_detectable(left_out + laws, model, records, until)
     tested = Tested(trials, behind, left_out, unseen)
-    return assemble(decision, clipped, refitted, tested, model, extended, records, missing, gain, runs)
+    leading = Leading.of(model, [refitted, *trials], decision.share, first, until[0])
+    return assemble(decision, clipped, refitted, tested, model, extended, records, missing, gain, runs, leading)
 
 
 def _believed(

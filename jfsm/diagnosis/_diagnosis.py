@@ -1,11 +1,15 @@
 """The outcome of a diagnosis, as a value."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import jax
+
 from ..structures import Structure
 from ._gain import Gain
+from ._next import Leading, Proposal, proposals
 
 
 @dataclass(frozen=True)
@@ -75,9 +79,30 @@ class Diagnosis:
     advice: str
     data: dict[str, Any]
     """Everything that `to_json` writes and the page shows, as plain types."""
+    leading: Leading | None = None
+    """The two most probable explanations, where there are two; None otherwise."""
 
     def __repr__(self) -> str:
         return f"<Diagnosis, {self.verdict}: {self.sentence}>"
+
+    def next_tests(
+        self, key: jax.Array | None = None, progress: Callable[[str, int, int], None] | None = None
+    ) -> list[Proposal]:
+        """Tests that would tell the two most probable causes apart, the one that tells most first.
+
+        Each is simulated with either of them as the truth, and both are fitted to it: some ten seconds a test. Empty
+        where there are no two causes to tell apart.
+
+        Parameters
+        ----------
+        key : jax.random.key, optional
+            Source of the noise of the simulated tests; always the same when None.
+        progress : callable, optional
+            Told of every test: what, tests done, tests in all.
+        """
+        if self.leading is None:
+            return []
+        return proposals(self.leading, jax.random.key(0) if key is None else key, progress)
 
     def print(self) -> None:
         """Verdict, findings and gain on the terminal."""

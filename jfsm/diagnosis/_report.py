@@ -15,12 +15,11 @@ from ._detectable import Unseen, detectable
 from ._diagnosis import CandidateResult, Diagnosis, Estimate, Finding, Rival
 from ._effect import Effect, names, places
 from ._gain import Gain
+from ._next import RIVAL, Leading
 from ._residual import Residual, curves
 from ._search import LeftBehind
 from ._trial import Trial
 
-_RIVAL = 0.02
-"""Probability from which another cause is listed as a rival."""
 _SHOWN = 2000
 """Points of a curve in the report."""
 
@@ -46,6 +45,7 @@ def assemble(
     missing: Residual,
     gain: Gain | None,
     runs: list[dict],
+    leading: Leading | None,
 ) -> Diagnosis:
     """The diagnosis, with everything that the report needs."""
     trials = tested.trials
@@ -85,7 +85,7 @@ def assemble(
     return Diagnosis(
         verdict=decision.verdict, findings=findings, candidates=candidates, extended=extended, refitted=refit,
         gain=gain, detectable={c: e for c, (_, e) in smallest.items()}, noise=noise, notes=notes,
-        sentence=sentence, advice=advice, data=data,
+        sentence=sentence, advice=advice, data=data, leading=leading,
     )  # fmt: skip
 
 
@@ -158,7 +158,7 @@ def _finding(which: int, decision: Decision, trials: list[Trial], model: Structu
             rival = rest.pop()
             instead[rival] = instead.get(rival, 0.0) + decision.share(t)
     ranked = sorted(instead.items(), key=lambda item: -item[1])
-    rivals = tuple(Rival(r.cause.id, r.at, share) for r, share in ranked if share > _RIVAL)
+    rivals = tuple(Rival(r.cause.id, r.at, share) for r, share in ranked if share > RIVAL)
     cause, values = effect.cause, _values(winner, which, model, units)
     return Finding(cause.id, cause.family, effect.at, probability, values, rivals, cause.sentence)
 

@@ -1,0 +1,235 @@
+"""What to measure next: the test that tells two rivals apart.
+
+Each rival in turn is taken to be right. A test is simulated with it, noise included, and both are fitted to what the
+sensors would show: the difference of their log-evidences is what the test is expected to say. The lesser of the two
+counts, for which of them is right is not known.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import jax
+import numpy as np
+
+from .._result import Result
+from .._threads import side_by_side
+from ..dynamics import simulate
+from ..identification import LADDER, Nuisances, Posterior, approach, finish, lanes_of, prepare
+from ..records import Record
+from ..structures import Structure
+from ._candidates import hypothesis
+from ._chance import noise_levels
+from ._decide import SIGNIFICANT
+from ._gain import remeasured
+from ._trial import Trial
+
+RIVAL = 0.02
+"""Probability from which another explanation is a rival."""
+_LEVELS, _SPEEDS, _SHIFTS = (0.25, 0.5, 2.0, 4.0), (0.7, 1.4), (0.5, -0.5)
+"""How much larger and faster the drive of a test may be, and a constant force beside it in its rms."""
+_KINDS = ("displacement", "velocity", "acceleration")
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A test, and what it is expected to say.
+
+    Attributes
+    ----------
+    what : str
+        The test in words.
+    nats : float
+        Difference of the rivals' log-evidences on its record alone, at least.
+    reach : float
+        Largest response to be expected, as a multiple of that in the record at hand.
+    rivals : (str, str)
+        The causes that it tells apart.
+    record : Record
+        Time and drive of the test; its responses are those of the more probable rival, without noise.
+    """
+
+    what: str
+    nats: float
+    reach: float
+    rivals: tuple[str, str]
+    record: Record
+
+    @property
+    def tells(self) -> bool:
+        """Whether the test is worth doing."""
+        return self.nats > SIGNIFICANT
+
+
+@dataclass(frozen=True)
+class Variation:
+    """A record at hand, changed: drive times `level`, `speed` times as fast, constant forces of `shift` times its rms,
+    and channels of another kind."""
+
+    level: float = 1.0
+    speed: float = 1.0
+    shift: float = 0.0
+    kind: str = ""
+
+    def words(self, record: Record) -> str:
+        """What to do, as a sentence without a stop."""
+        shaken = record.drive == "motion" or record.base_acceleration is not None
+        drive = "the same motion" if shaken else "the same force" if record.driven else "a release"
+        if self.kind:
+            return f"the same test with the {self.kind} measured as well"
+        if self.shift:
+            forces = [
+                f"{self.shift * _rms(y):+.3g} {record.units['force']}"
+                for (kind, _), y in record.channels.items()
+                if kind == "force"
+            ]
+            return f"{drive} with a constant force of {' and '.join(forces)} added"
+        if self.speed != 1.0:
+            return f"{drive} played {self.speed:g} times as fast"
+        return f"{drive} {'from' if drive == 'a release' else 'at'} {self.level:g} times the size"
+
+
+@dataclass(frozen=True)
+class Leading:
+    """The two most probable explanations of a record, and the first `samples` of it, on which tests are modelled."""
+
+    model: Structure
+    rivals: tuple[Trial, Trial]
+    nuisances: Nuisances
+    samples: int
+
+    @classmethod
+    def of(
+        cls,
+        model: Structure,
+        trials: Sequence[Trial],
+        share: Callable[[Trial], float],
+        nuisances: Nuisances,
+        until: int,
+    ) -> "Leading | None":
+        """The two most probable of the trials, where both have a chance."""
+        first = sorted(trials, key=share, reverse=True)[:2]
+        if len(first) < 2 or share(first[1]) < RIVAL:
+            return None
+        return cls(model, (first[0], first[1]), nuisances, until)
+
+    def tests(self) -> list[Variation]:
+        """Tests that could be made with this structure."""
+        record = self.nuisances.record
+        tests = [Variation(level=level) for level in _LEVELS]
+        if record.drive == "motion":
+            return tests
+        if record.driven:
+            tests += [Variation(speed=speed) for speed in _SPEEDS]
+        if any(kind == "force" and np.any(y) for (kind, _), y in record.channels.items()):
+            tests += [Variation(shift=shift) for shift in _SHIFTS]
+        measured = {kind for kind, _ in self.nuisances.channels}
+        return tests + [Variation(kind=kind) for kind in _KINDS if kind not in measured]
+
+
+def proposals(leading: Leading, key: jax.Array, tell: Callable[[str, int, int], None] | None = None) -> list[Proposal]:
+    """Every test that could be simulated, the one that tells most first."""
+    tests = leading.tests()
+    found = []
+    for done, test in enumerate(tests):
+        words = test.words(leading.nuisances.record)
+        if tell is not None:
+            tell(words, done, len(tests))
+        found += _tried(leading, test, words, jax.random.fold_in(key, done))
+    return sorted(found, key=lambda p: -p.nats)
+
+
+def _tried(leading: Leading, test: Variation, words: str, key: jax.Array) -> list[Proposal]:
+    """A test as a proposal, or nothing where a rival runs away in it."""
+    seeds = np.random.default_rng(np.asarray(jax.random.key_data(key)).astype(np.uint32).tolist()).spawn(2)
+    records = [_made(leading, test, truth, seed) for truth, seed in zip(leading.rivals, seeds, strict=True)]
+    (clean, first), (_, second) = records
+    if clean is None or first is None or second is None:
+        return []
+    nats = min(separation(leading, first), -separation(leading, second))
+    return [Proposal(words, nats, _reach(leading, clean), (leading.rivals[0].name, leading.rivals[1].name), clean)]
+
+
+def separation(leading: Leading, record: Record) -> float:
+    """Nats by which a record speaks for the first of the rivals."""
+    nuisances = prepare(record, leading.model, leading.nuisances.reconstruction)
+    one, other = side_by_side(partial(_evidence, leading.model, nuisances), leading.rivals)
+    return one - other
+
+
+def _evidence(model: Structure, nuisances: Nuisances, rival: Trial) -> float:
+    """Log-evidence of a rival on another record, from where the one at hand left its numbers."""
+    start = model
+    for part in rival.parts:
+        start = start + part
+    values = rival.structure.values()
+    lanes = lanes_of(start)
+    records = [nuisances.resolving([start])]
+    own = {path: values[path] for path in model.entries()}
+    posterior = Posterior(
+        hypothesis(model, [start] * lanes, records, begins=[own] * lanes), records, [nuisances.samples]
+    )
+    return finish(posterior, approach(posterior, LADDER[-1:])).evidence(0)
+
+
+def _made(
+    leading: Leading, test: Variation, truth: Trial, rng: np.random.Generator
+) -> tuple[Record, Record] | tuple[None, None]:
+    """The test's record had `truth` been right, without noise and with."""
+    nuisances = leading.nuisances
+    plan = _plan(nuisances.record[: leading.samples], test)
+    structure = truth.extended()
+    state = None if plan.driven else _start(truth, nuisances, test.level)
+    response = simulate(structure, plan, state, reconstruction=nuisances.reconstruction, solver="grid")
+    if response.result != Result.successful:
+        return None, None
+    shown = response.readings(plan)
+    levels = noise_levels(truth, nuisances)
+    share = float(np.median([levels[c] / s for c, s in zip(nuisances.channels, nuisances.spread, strict=True)]))
+    levels |= {channel: share * float(np.std(y)) for channel, y in shown.items() if channel not in levels}
+    clean = {channel: shown.get(channel, y) for channel, y in plan.channels.items()}
+    return remeasured(plan, clean, {}, rng), remeasured(plan, clean, levels, rng)
+
+
+def _plan(record: Record, test: Variation) -> Record:
+    """Time and drive of a test, from rest where anything drives, with channels that hold nothing yet."""
+    time = record.time[0] + (record.time - record.time[0]) / test.speed
+    channels: dict[str, Any] = {}
+    for (kind, j), y in record.channels.items():
+        drives = (kind != "force") == (record.drive == "motion")
+        shift = test.shift * _rms(y) if kind == "force" else 0.0
+        channels.setdefault(kind, {})[j] = test.level * y + shift if drives else np.zeros(y.size)
+    if test.kind:
+        channels[test.kind] = {j: np.zeros(time.size) for j in sorted({j for kind, j in record.responses})}
+    base = record.base_acceleration
+    if base is not None:
+        channels["base_acceleration"] = test.level * base
+    return Record(time, **channels, at_rest=record.driven, drive=record.drive, units=dict(record.units))
+
+
+def _start(truth: Trial, nuisances: Nuisances, level: float) -> tuple[np.ndarray, np.ndarray]:
+    """State from which a structure is released, `level` times as far as it was."""
+    values = {u.path: u.value(theta) for u, theta in zip(truth.unknowns, truth.theta, strict=True)}
+
+    def start(name: str, guess: np.ndarray) -> np.ndarray:
+        found = [values.get(f"{name}@{j + 1}") for j in range(guess.size)]
+        return level * np.array([one if one is not None else other for one, other in zip(found, guess, strict=True)])
+
+    return start("x0", nuisances.x0), start("v0", nuisances.v0)
+
+
+def _reach(leading: Leading, test: Record) -> float:
+    """Largest answer of a test beside that of the record at hand, in the first of its channels."""
+    there = leading.nuisances.record.answers
+    channel = next(iter(there))
+    return _peak(test.answers[channel]) / max(_peak(there[channel]), 1e-300)
+
+
+def _rms(y: np.ndarray) -> float:
+    return math.sqrt(float(np.mean(y**2)))
+
+
+def _peak(y: np.ndarray) -> float:
+    return float(np.max(np.abs(y)))

@@ -1,0 +1,79 @@
+"""What to measure next: the advised test is done on the plant itself, and tells the rivals apart."""
+
+import jax
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+
+import jfsm
+from jfsm.diagnosis._next import Leading, Variation, _tried
+
+MASS, STIFFNESS, DAMPING = 1.0, 40.0, 0.5
+BELIEVED = jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING)
+RIVALS = ("cubic_softening", "sine_stiffness")
+
+
+def measured(time: np.ndarray, force: np.ndarray, seed: int) -> jfsm.Record:
+    """A pendulum's spring beside the believed one, driven from rest; displacement with 1 % noise."""
+    drive, rng = CubicSpline(time, force), np.random.default_rng(seed)
+
+    def motion(t, y):
+        return [y[1], (drive(t) - 20.0 * y[0] - 20.0 * np.sin(y[0]) - DAMPING * y[1]) / MASS]
+
+    x = solve_ivp(motion, (time[0], time[-1]), [0.0, 0.0], t_eval=time, rtol=1e-9, atol=1e-11).y[0]
+    force, x = (y + 0.01 * np.std(y) * rng.standard_normal(time.size) for y in (force, x))
+    return jfsm.Record(time, force, x, at_rest=True)
+
+
+@pytest.fixture(scope="module")
+def undecided():
+    """Swings too small for the difference between a sine and its first two terms."""
+    time = np.arange(1200) * 0.05
+    force = 1.2 * np.cos(5.9 * time) + 0.8 * np.sin(7.1 * time + 1.0)
+    return jfsm.diagnose(measured(time, force, 1), BELIEVED, causes=RIVALS, key=jax.random.key(0))
+
+
+def test_a_larger_force_tells_a_sine_from_a_cubic_and_does_when_it_is_tried(undecided):
+    assert undecided.leading is not None
+    first = {t.name: undecided.leading.rivals.index(t) for t in undecided.leading.rivals}
+    assert set(first) == set(RIVALS)
+    said = []
+    found = undecided.next_tests(progress=lambda *step: said.append(step))
+    assert [p.nats for p in found] == sorted((p.nats for p in found), reverse=True)
+    assert said[0][1:] == (0, len(said)) and len(found) <= len(said)
+    best = found[0]
+    assert best.nats > 10.0 and best.reach > 1.5 and "times the size" in best.what
+    assert best.record.force is not None
+    record = measured(best.record.time, best.record.force[:, 0], 2)
+    again = jfsm.diagnose(record, BELIEVED, causes=RIVALS, key=jax.random.key(1))
+    assert again.findings[0].cause == "sine_stiffness" and again.findings[0].probability > 0.95
+
+
+def test_the_same_key_proposes_the_same(undecided):
+    leading = undecided.leading
+    one, again = (Leading(leading.model, leading.rivals, leading.nuisances, 600) for _ in range(2))
+    key = jax.random.key(5)
+    assert _tried(one, Variation(level=2.0), "", key)[0].nats == _tried(again, Variation(level=2.0), "", key)[0].nats
+
+
+def test_what_nothing_competes_with_needs_no_other_test(undecided):
+    leading = undecided.leading
+    shares = {id(t): share for t, share in zip(leading.rivals, (0.99, 0.01), strict=True)}
+    args = (leading.model, leading.rivals, lambda t: shares[id(t)], leading.nuisances, leading.samples)
+    assert Leading.of(*args) is None
+    assert Leading.of(args[0], leading.rivals[:1], *args[2:]) is None
+
+
+@pytest.mark.parametrize(
+    ("drive", "what"),
+    [
+        (Variation(level=2.0), "the same force at 2 times the size"),
+        (Variation(speed=1.4), "the same force played 1.4 times as fast"),
+        (Variation(shift=0.5), "the same force with a constant force of +1 N added"),
+        (Variation(kind="velocity"), "the same test with the velocity measured as well"),
+    ],
+)
+def test_a_test_is_put_in_words(drive: Variation, what: str):
+    record = jfsm.Record(np.arange(4) * 0.1, np.array([2.0, -2.0, 2.0, -2.0]), np.zeros(4))
+    assert drive.words(record) == what
