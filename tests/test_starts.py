@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -217,9 +218,30 @@ def test_shapes_too_stiff_for_the_samples_leave_the_others_to_begin_from():
     assert first["lugre@0-1.F"] == pytest.approx(1.0, rel=0.5)
 
 
-def test_a_law_of_which_every_shape_runs_away_is_not_placed(monkeypatch):
+class Unbounded(jfsm.CubicStiffness):
+    """A law whose force is no number."""
+
+    def force(self, d, w, z, t):
+        return self.k3 * jnp.inf * d
+
+
+def test_a_law_of_which_every_shape_runs_away_is_not_placed():
     r = record(lambda x, v: 3.0 * x**3)
-    prepared, law = prepare(r, MODEL), jfsm.CubicStiffness(1.0, at=(0, 1))
+    prepared, law = prepare(r, MODEL), Unbounded(1.0, at=(0, 1))
     latent, scale = missing_force(MODEL, prepared), scale_of(prepared, MODEL)
-    monkeypatch.setattr(jfsm.CubicStiffness, "force", lambda self, d, w, z, t: self.k3 * jnp.inf * d)
     assert place(law, latent, MODEL, scale, prepared) == []
+
+
+def test_records_of_similar_length_share_the_programs_that_place_a_law(caplog):
+    def placed(samples):
+        prepared = prepare(record(lambda x, v: 3.0 * x**3)[:samples], MODEL)
+        latent = missing_force(MODEL, prepared)
+        law = jfsm.BoucWen(1.0, 1.0, 1.0, 1.0, at=(0, 1))
+        return place(law, latent, MODEL, scale_of(prepared, MODEL), prepared)
+
+    first = placed(1200)
+    with caplog.at_level("WARNING", "jax"), jax.log_compiles():
+        second = placed(1150)
+    large = ("_along_each", "_likelihoods", "_smooth", "force_along")
+    assert not [m for m in caplog.messages if m.startswith("Compiling") and any(name in m for name in large)]
+    assert second[0].share == pytest.approx(first[0].share, abs=0.05)

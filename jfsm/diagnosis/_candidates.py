@@ -3,12 +3,11 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import product, zip_longest
+from itertools import chain, product, zip_longest
 
 import equinox as eqx
 
-from ..estimation import Latent
+from .._threads import side_by_side
 from ..identification import (
     DEGREES,
     DEGREES_BESIDE,
@@ -107,7 +106,7 @@ def candidates(
     places: Sequence[tuple] | None = None,
 ) -> list[Candidate]:
     """Every cause of `selection` at every place: link laws on the model's links, sensor effects on the channels."""
-    found, laws, imposed = [], Laws(model, records[0]), records[0].path is not None
+    physical, sensors, imposed = [], [], records[0].path is not None
     for cause in selection.values():
         if not any(p.free for p in cause.effect.parameters):
             continue  # nothing to fit: a clipped channel shows by itself
@@ -117,11 +116,11 @@ def candidates(
             channels = ("force",) if imposed else cause.effect.channels
             kinds = [kind for kind in channels if imposed or _shows(cause.effect, kind, records)]
             spots = dict.fromkeys(c for n in records for c in n.record.channels if c[0] in kinds)
-            found += [Candidate((Effect(cause, at),), natural_starts(model, cause, at, records[0])) for at in spots]
+            sensors += [Candidate((Effect(cause, at),), natural_starts(model, cause, at, records[0])) for at in spots]
         else:
-            for at in model.links if places is None else places:
-                found += [laws.candidate(Effect(cause, at)), *laws.about_a_rest(Effect(cause, at))]
-    return found
+            physical += [Effect(cause, at) for at in (model.links if places is None else places)]
+    laws = chain.from_iterable(side_by_side(Laws(model, records[0]).of, physical)) if physical else ()
+    return [*laws, *sensors]
 
 
 def promising(tried: Sequence[Candidate]) -> tuple[list[Candidate], list[Candidate]]:
@@ -138,16 +137,17 @@ class Laws:
 
     def __init__(self, structure: Structure, nuisances: Nuisances):
         self.structure, self.nuisances, self.scale = structure, nuisances, scale_of(nuisances, structure)
-
-    @cached_property
-    def missing(self) -> Latent:
-        return missing_force(self.structure, self.nuisances)
+        self.missing = missing_force(structure, nuisances)
 
     def placed(self, effect: Effect, others: Sequence[AbstractTerm] = ()) -> list[Placed]:
         """Shapes of a law that explain most; the sizes of `others`, which the structure has, are free beside it."""
         kind, sign = effect.cause.effect, effect.cause.sign
         law = kind(**kind.shapes(self.scale)[0], at=effect.at)
         return place(law, self.missing, self.structure, self.scale, self.nuisances, others, sign, sides=True)
+
+    def of(self, effect: Effect) -> list[Candidate]:
+        """The law from where it explains most, and where it may rest elsewhere, from there."""
+        return [self.candidate(effect), *self.about_a_rest(effect)]
 
     def candidate(self, effect: Effect) -> Candidate:
         placed = self.placed(effect)

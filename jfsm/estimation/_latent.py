@@ -19,6 +19,7 @@ from jaxtyping import Array, Float
 from scipy.ndimage import maximum_filter1d
 
 from ..dynamics._along import force_along
+from ..dynamics._excitation import bucket
 from ..dynamics._grid import Fine
 from ..dynamics._plant import Plant, Readout
 from ._kalman import LinearModel, log_likelihood, smoothed
@@ -79,10 +80,12 @@ def latent_force(
         Angular frequency [rad/s] and size of the motion.
     """
     n, dt = len(values), float(fine.step)
-    base = np.asarray(fine.base)[:n]
-    true = (np.asarray(fine.force)[:n] - np.asarray(plant.force_offset)) / (1 + np.asarray(plant.force_gain))
+    padded = min(bucket(n), fine.time.shape[0])  # nothing is read where it is filled up
+    values, use = (np.pad(np.asarray(q), ((0, padded - n), (0, 0))) for q in (values, use))
+    base = np.asarray(fine.base)[:padded]
+    true = (np.asarray(fine.force)[:padded] - np.asarray(plant.force_offset)) / (1 + np.asarray(plant.force_gain))
     true = true - base[..., None] * np.asarray(plant.mass).sum(1)
-    seen = (np.asarray(values) - np.asarray(plant.channel_offset)) / (1 + np.asarray(plant.channel_gain))
+    seen = (values - np.asarray(plant.channel_offset)) / (1 + np.asarray(plant.channel_gain))
     acceleration = np.array([kind == "acceleration" for kind in show.kinds])
     seen = seen - base[:, :1] * acceleration
     models = [
@@ -107,7 +110,8 @@ def latent_force(
     mean, std = (np.asarray(out) for out in _smooth(best, *data))
     dof = plant.dof
     x, v, r = mean[:, :dof], mean[:, dof : 2 * dof], mean[:, 2 * dof :]
-    known = np.asarray(force_along(plant, jnp.asarray(x), jnp.asarray(v), fine.time[:n]))
+    known = np.asarray(force_along(plant, jnp.asarray(x), jnp.asarray(v), fine.time[:padded]))
+    x, v, r, known, std = (q[:n] for q in (x, v, r, known, std))
     period = max(int(2 * np.pi / (omega * dt)), 1)
     moves = maximum_filter1d(np.abs(v), period, axis=0) > _CERTAIN * std[:, dof : 2 * dof]
     return Latent(x, v, r - known, std[:, 2 * dof :], np.any(moves, 1))

@@ -19,6 +19,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from ..dynamics._along import force_along
+from ..dynamics._excitation import bucket
 from ..dynamics._imposed import Imposed
 from ..dynamics._needed import force_needed
 from ..dynamics._plant import Grid, Plant, direction, lower
@@ -236,14 +237,14 @@ class _Regression:
     ) -> "_Regression | None":
         """None where the missing force is no number."""
         n = len(latent.force)
-        motion = jnp.asarray(latent.displacement), jnp.asarray(latent.velocity), jnp.asarray(nuisances.record.time[:n])
+        motion = _still_afterwards(latent, np.asarray(nuisances.record.time[:n]))
         # At rest friction is anything within its limits, and all else is noise.
         moves = latent.moves if np.any(latent.moves) else np.ones(n, bool)
         missing = latent.force[moves]
         if not np.all(np.abs(missing) < _NO_FORCE):
             return None
         spread = np.maximum(missing.std(0), 1e-300)
-        beside = [np.asarray(force_along(lower(Structure(structure.mass, [t])), *motion)) for t in others]
+        beside = [np.asarray(force_along(lower(Structure(structure.mass, [t])), *motion))[:n] for t in others]
         basis, doubt = _basis(latent, structure, beside)
         basis = (basis[moves] / spread[:, None]).reshape(-1, len(doubt))
         return cls(law, structure, motion, moves, missing, spread, basis, doubt, np.zeros((0, len(doubt))))
@@ -261,7 +262,10 @@ class _Regression:
         """Forces (rows, samples x dof) of those shapes that do not run away along the motion, and these."""
         kind = type(self.law)
         lots = list(_lots(kind, rows))
-        forces = np.concatenate([_forces(self.law, lot, self.structure, self.motion, len(some)) for some, lot in lots])
+        forces = np.concatenate(
+            [_forces(self.law, lot, self.structure, self.motion)[: len(some)] for some, lot in lots]
+        )
+        forces = forces[:, : len(self.moves)]
         stable = np.max(np.abs(forces), (1, 2)) < _RUN_AWAY * np.max(self.spread)  # false for what is no number, too
         rows = list(compress(rows, stable))
         return (forces[stable][:, self.moves] / self.spread).reshape(len(rows), self.missing.size), rows
@@ -370,8 +374,17 @@ def _lots(kind: type[AbstractTerm], rows: list[dict[str, float]]):
         yield chunk, np.array([[row[p.name] for p in kind.parameters] for row in filled])
 
 
-def _forces(law: AbstractTerm, numbers: np.ndarray, structure: Structure, motion, count: int) -> np.ndarray:
-    """Forces (count, n, dof) of a law along a motion for rows of its numbers."""
+def _still_afterwards(latent: Latent, time: np.ndarray) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """The smoothed motion, standing still from its end on, in a length that others share."""
+    more = bucket(len(time)) - len(time)
+    later = time[-1] + (time[-1] - time[-2]) * np.arange(1, more + 1)
+    x = np.pad(latent.displacement, ((0, more), (0, 0)), "edge")
+    v = np.pad(latent.velocity, ((0, more), (0, 0)))
+    return jnp.asarray(x), jnp.asarray(v), jnp.asarray(np.concatenate([time, later]))
+
+
+def _forces(law: AbstractTerm, numbers: np.ndarray, structure: Structure, motion) -> np.ndarray:
+    """Forces (rows, n, dof) of a law along a motion for rows of its numbers."""
     unit = type(law)(**dict(zip((p.name for p in law.parameters), numbers[0], strict=True)), at=law.at)
     plant = lower(Structure(structure.mass, [unit]))
     slots = {name: getattr(plant, name) for name in ("smooth", "friction", "memory", "delayed")}
@@ -379,7 +392,7 @@ def _forces(law: AbstractTerm, numbers: np.ndarray, structure: Structure, motion
     width = slots[name].parameters.shape[1]
     padded = np.zeros((len(numbers), 1, width))
     padded[:, 0, : numbers.shape[1]] = numbers
-    return np.asarray(_along_each(plant, name, jnp.asarray(padded), *motion))[:count]
+    return np.asarray(_along_each(plant, name, jnp.asarray(padded), *motion))
 
 
 @eqx.filter_jit
