@@ -4,7 +4,8 @@
 
 One line of JSON per challenge is appended to the file as it is done; the same call goes on where it was stopped. With
 `--two`, two effects of different families are hidden at once; with `--outside`, one that no catalogue names; with
-`--dirt`, records are as a laboratory has them: coloured noise, steps, outliers, drift, half a sample of delay.
+`--dirt`, records are as a laboratory has them: coloured noise, steps, outliers, drift, half a sample of delay. `--page`
+writes who was taken for whom, calibration, gain and time as a page, and the figures as JSON beside it.
 """
 
 import argparse
@@ -21,7 +22,8 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from benchmarks.blind_table import Row, exact, hidden, said, table  # noqa: E402  (needs the line above when run as a script)
+from benchmarks.blind_page import write_page  # noqa: E402  (needs the line above when run as a script)
+from benchmarks.blind_table import Row, exact, hidden, said, table  # noqa: E402
 from tests.blind import CAUSES, DIRT, OUTSIDE, PAIRS, Challenge, draw, draw_two, soiled  # noqa: E402
 from tests.blind.challenge import CHANNEL_SETS, NOISE_LEVELS  # noqa: E402
 from tests.blind.dirt import TAKEN_FOR  # noqa: E402
@@ -200,7 +202,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--channels", nargs="+", default=list(CHANNEL_SETS), choices=list(CHANNEL_SETS))
     parser.add_argument("--excitation", nargs="+", default=list(DRIVES), choices=list(DRIVES))
     parser.add_argument("--out", type=Path, help="file of JSON lines to append to and to resume from")
+    parser.add_argument("--page", type=Path, help="HTML file for pictures and figures; the figures as JSON beside it")
     given = parser.parse_args(arguments)
+    if given.page and given.page.suffix != ".html":
+        parser.error(f"--page must name an .html file; got {given.page}.")
     drawing = {name: getattr(given, name) for name in ("causes", "noise", "channels", "excitation")}
     if given.outside:
         drawing["causes"] = list(OUTSIDE)
@@ -210,8 +215,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         drawing["dirt"] = given.dirt
         drawing["causes"] = [cause for cause in drawing["causes"] if cause not in TAKEN_FOR.get(given.dirt, ())]
     rows = run(range(given.seed, given.seed + given.n), drawing, given.jobs, given.out, lambda s: print(s, flush=True))
+    rows = sorted(rows, key=lambda row: row["seed"])
     if rows:
-        print("\n" + table(sorted(rows, key=lambda row: row["seed"])))
+        print("\n" + table(rows))
+    if rows and given.page:
+        write_page(rows, given.page)
 
 
 if __name__ == "__main__":

@@ -7,19 +7,26 @@ from types import SimpleNamespace
 import pytest
 
 from benchmarks import blind
+from benchmarks.blind_page import write_page
 from benchmarks.blind_table import (
     Row,
     Share,
+    calibration,
+    calibration_error,
     confusions,
     covers,
     exact,
+    group,
     half,
     hidden,
     in_class,
     kind,
+    right_class,
+    right_family,
     said,
     silent,
     table,
+    twins,
     wrong,
 )
 
@@ -131,6 +138,34 @@ def test_what_was_said_is_the_first_cause_the_values_or_the_verdict():
     assert [said(r) for r in (NAMED, VALUE, QUIET)] == ["coulomb", "damping_value+stiffness_value", "consistent"]
 
 
+def test_twins_are_what_narrow_motion_does_not_separate():
+    cubic = row("cubic_damping", "cause", finding("quadratic_damping", rivals=("cubic_damping", "power_damping")))
+    assert twins(cubic) == {"quadratic_damping", "cubic_damping", "power_damping"}
+    assert right_class(cubic) and in_class(cubic) and group(cubic) == 3
+    assert not right_class(row("cubic_damping", "cause", finding("coulomb")))
+    assert not right_class(row("cubic_damping", "unnamed"))
+    assert not twins(row("jenkins", "cause", finding("jenkins")))
+
+
+def test_a_late_force_is_a_late_channel_where_there_is_but_one():
+    late = row("force_delay", "cause", finding("channel_delay"))
+    assert right_class(late) and twins(late) == {"force_delay", "channel_delay"}
+    assert not twins(late | {"channel_set": "xva"}) and not right_class(late | {"channel_set": "xva"})
+
+
+def test_the_family_may_be_right_where_the_name_is_not():
+    assert right_family(RIVAL) and not right_family(MISSED) and not right_family(FAILED)
+    assert not right_family(row("coulomb", "cause", finding("jenkins")))
+
+
+def test_calibration_compares_what_was_said_with_how_often_it_held():
+    half_sure = [row("coulomb", "cause", finding(said, 0.55)) for said in ("coulomb", "jenkins", "jenkins", "jenkins")]
+    sure = [row("coulomb", "cause", finding("coulomb", 0.95))] * 4
+    [(first, low), (second, high)] = calibration([*half_sure, *sure, QUIET, FAILED])
+    assert (first, low, second, high) == (0.55, Share(1, 4), pytest.approx(0.95), Share(4, 4))
+    assert calibration_error([*half_sure, *sure]) == pytest.approx(0.5 * 0.3 + 0.5 * 0.05)
+
+
 def test_confusions_are_counted_commonest_first():
     assert confusions([NAMED, MISSED, RIVAL, SURE_AND_WRONG, QUIET]) == [
         ("coulomb", "quadratic_damping", 2),
@@ -147,6 +182,10 @@ def test_the_table_counts_each_row_where_it_belongs():
         "challenges 10",
         "cause named exactly 2 of 6 = 33%",
         "cause first or a rival 3 of 6 = 50%",
+        "of those without twin none drawn",
+        "twins: one of them 2 of 6 = 33%",
+        "twins: mean group 1.25",
+        "family named 4 of 6 = 67%",
         "wrong value named 1 of 2 = 50%",
         "silent where no law is 3 of 4 = 75%",
         "with nothing wrong 1 of 2 = 50%",
@@ -176,6 +215,18 @@ def test_of_an_effect_outside_the_catalogue_no_name_is_the_right_answer():
 
 def test_a_table_of_nothing_but_failures_still_prints():
     assert "seconds, median none" in " ".join(table([FAILED]).split())
+
+
+def test_the_page_shows_whom_what_was_taken_for_and_the_figures_stand_beside_it(tmp_path: Path):
+    write_page([NAMED, RIVAL, SURE_AND_WRONG, QUIET, FAILED], tmp_path / "blind.html")
+    page, plain = (tmp_path / "blind.html").read_text(), json.loads((tmp_path / "blind.json").read_text())
+    assert page.count("<svg") == 3 and "quadratic_damping" in page and "seeds 1 to 7" in page
+    assert "wrong with p &gt; 0.9" in page
+    assert plain["cause named exactly"] == {"hits": 1, "count": 4, "low": pytest.approx(0.0456, abs=5e-5),
+                                            "high": pytest.approx(0.6994, abs=5e-5)}  # fmt: skip
+    assert plain["twins: mean group"] == pytest.approx(4 / 3) and plain["seconds, median"] == 2.0
+    write_page([FAILED], tmp_path / "failed.html")
+    assert json.loads((tmp_path / "failed.json").read_text())["seconds, median"] is None
 
 
 # two hidden effects
