@@ -105,7 +105,7 @@ def candidates(
     selection: Mapping[str, Cause],
     places: Sequence[tuple] | None = None,
 ) -> list[Candidate]:
-    """Every cause of `selection` at every place: link laws on the model's links, sensor effects on the channels."""
+    """Every cause of `selection` at every place: laws on links or masses, sensor effects on the channels."""
     physical, sensors, imposed = [], [], records[0].path is not None
     for cause in selection.values():
         if not any(p.free for p in cause.effect.parameters):
@@ -118,9 +118,16 @@ def candidates(
             spots = dict.fromkeys(c for n in records for c in n.record.channels if c[0] in kinds)
             sensors += [Candidate((Effect(cause, at),), natural_starts(model, cause, at, records[0])) for at in spots]
         else:
-            physical += [Effect(cause, at) for at in (model.links if places is None else places)]
+            physical += [Effect(cause, at) for at in _spots(cause, model, places)]
     laws = chain.from_iterable(side_by_side(Laws(model, records[0]).of, physical)) if physical else ()
     return [*laws, *sensors]
+
+
+def _spots(cause: Cause, model: Structure, places: Sequence[tuple] | None) -> list[tuple]:
+    """Where a law may be: on the links, or on the masses if it hangs on one."""
+    if not cause.effect.hangs:
+        return list(model.links if places is None else places)
+    return [(0, j) for j in range(1, model.dof + 1) if places is None or (0, j) in places]
 
 
 def promising(tried: Sequence[Candidate]) -> tuple[list[Candidate], list[Candidate]]:
@@ -227,11 +234,13 @@ def own_paths(model: Structure, records: Sequence[Nuisances]) -> tuple[str, ...]
     """The model's own values that a refit may change.
 
     Without any force only ratios show, so masses stay as stated; so they do where a motion is imposed that needs hardly
-    any force for them. Values of zero have nothing to be relative to.
+    any force for them. Values of zero have nothing to be relative to. Offsets are nuisances also where they are stated.
     """
     scaled = any(n.weighs(model) for n in records)
     values = model.values()
-    free = [p for p, (what, _) in model.entries().items() if what.free and values[p] != 0]
+    free = [
+        p for p, (what, _) in model.entries().items() if what.free and values[p] != 0 and not p.startswith("offset@")
+    ]
     return tuple(p for p in free if scaled or not p.startswith("mass@"))
 
 

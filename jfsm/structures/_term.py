@@ -114,6 +114,8 @@ class AbstractTerm(eqx.Module):
     """First part of the path of its parameters, ``coulomb`` in ``coulomb@0-1.F``."""
     parameters: ClassVar[tuple[Parameter, ...]]
     states: ClassVar[int] = 0
+    hangs: ClassVar[bool] = False
+    """Whether it hangs on one mass, at ``(0, j)``, and not between two."""
     base: ClassVar[tuple[float, ...]] = ()
     """Share of the base's acceleration that each hidden state loses: 1 for the velocity of a mass of its own."""
 

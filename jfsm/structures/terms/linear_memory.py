@@ -50,6 +50,7 @@ class AttachedOscillator(AbstractTerm):
         Parameter("zeta", meaning="damping ratio", least=0.0),
     )
     states = 2
+    hangs = True
     base = (0.0, 1.0)
 
     def __check_init__(self):

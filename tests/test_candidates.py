@@ -1,0 +1,51 @@
+"""What is tried, and where: laws on links and masses, and the unknowns that go with them."""
+
+import numpy as np
+import pytest
+
+import jfsm
+from jfsm.diagnosis._candidates import candidates, chosen_causes, hypothesis, own_paths
+from jfsm.identification import Nuisances, prepare
+
+CHAIN = jfsm.Structure.chain([1.0, 1.0], [20.0, 20.0], [0.2, 0.2])
+
+
+@pytest.fixture(scope="module")
+def shaken() -> Nuisances:
+    """Two masses under a sum of sines, as a cubic spring between them leaves it."""
+    time = np.arange(400) * 0.05
+    force = np.column_stack([10 * np.cos(1.7 * time) + 8 * np.cos(4.1 * time + 1), np.zeros(400)])
+    run = jfsm.simulate(CHAIN + jfsm.CubicStiffness(30.0, at=(1, 2)), jfsm.Record(time, force, at_rest=True))
+    rng = np.random.default_rng(2)
+    x = run.displacement + 0.01 * run.displacement.std() * rng.standard_normal((400, 2))
+    return prepare(jfsm.Record(time, force, x, at_rest=True), CHAIN)
+
+
+def places(cause: str, shaken: Nuisances, given=None) -> list[tuple]:
+    return [c.effects[0].at for c in candidates(CHAIN, [shaken], chosen_causes([cause]), given)]
+
+
+def test_laws_are_tried_on_every_link_and_a_hung_mass_on_every_mass(shaken):
+    assert places("cubic_hardening", shaken) == [(0, 1), (1, 2)]
+    assert places("attached_oscillator", shaken) == [(0, 1), (0, 2)]
+
+
+def test_places_that_are_given_are_the_only_ones(shaken):
+    assert places("cubic_hardening", shaken, [(1, 2)]) == [(1, 2)]
+    assert places("attached_oscillator", shaken, [(1, 2)]) == []
+    assert places("attached_oscillator", shaken, [(0, 2), (1, 2)]) == [(0, 2)]
+
+
+def test_the_whole_catalogue_fits_a_chain(shaken):
+    tried = candidates(CHAIN, [shaken], chosen_causes(None))
+    assert {c.effects[0].cause.id for c in tried} > {"attached_oscillator", "jenkins", "maxwell", "force_delay"}
+    best = max(tried, key=lambda c: c.share or 0.0)
+    assert best.effects[0].at == (1, 2)
+
+
+def test_a_stated_offset_is_one_unknown_and_no_own_value(shaken):
+    model = CHAIN + jfsm.Offset(0.001, at=("displacement", 2))
+    assert not [p for p in own_paths(model, [shaken]) if p.startswith("offset@")]
+    tried = hypothesis(model, [model + jfsm.CubicStiffness(1.0, at=(1, 2))], [shaken])
+    paths = [u.path for u in tried.unknowns[0]]
+    assert len(paths) == len(set(paths)) and "offset@displacement-2.b" in paths
