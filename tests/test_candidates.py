@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.diagnosis._candidates import candidates, chosen_causes, hypothesis, own_paths
+from jfsm.diagnosis._candidates import candidates, chosen_causes, contained, hypothesis, own_paths
 from jfsm.identification import Nuisances, prepare
 
 CHAIN = jfsm.Structure.chain([1.0, 1.0], [20.0, 20.0], [0.2, 0.2])
@@ -49,3 +49,12 @@ def test_a_stated_offset_is_one_unknown_and_no_own_value(shaken):
     tried = hypothesis(model, [model + jfsm.CubicStiffness(1.0, at=(1, 2))], [shaken])
     paths = [u.path for u in tried.unknowns[0]]
     assert len(paths) == len(set(paths)) and "offset@displacement-2.b" in paths
+
+
+def test_the_special_cases_of_a_law_are_followed_where_it_is(shaken):
+    tried = candidates(CHAIN, [shaken], chosen_causes(["quadratic_damping", "cubic_damping", "position_damping"]))
+    near = contained([jfsm.PowerDamping(1.0, 2.1, at=(1, 2)), jfsm.CubicStiffness(1.0, at=(0, 1))], tried)
+    assert {(c.effects[0].cause.id, c.effects[0].at) for c in near} == {
+        ("quadratic_damping", (1, 2)),
+        ("cubic_damping", (1, 2)),
+    }

@@ -145,3 +145,32 @@ def test_a_prediction_whose_filter_says_it_knows_nothing_explains_nothing():
     assert lost.left == 0.0 and lost.beside(refitted).left > 0.02
     known = Prediction(np.array([1e-6, 2e-6]), np.full(2, 2e-6), np.full(2, 1e-7))
     assert known.beside(refitted).left == known.left == 0.0
+
+
+@pytest.mark.parametrize(("nats", "named"), [(700.0, "cubic_damping"), (900.0, None)])
+def test_of_laws_alike_the_one_whose_shape_is_right_is_named(nats: float, named: str | None):
+    lack = {"quadratic_damping": 900.0, "cubic_damping": nats}
+    tried = [trial(9000.0, 0.002, "quadratic_damping"), trial(8990.0, 0.0021, "cubic_damping")]
+    lacking = [lack[t.effects[0].cause.id] for t in tried]
+    decision = decide(GIVEN, REFITTED, tried, lambda t: None, lambda t: lacking[tried.index(t)], periods=50.0)
+    assert decision.verdict == ("cause" if named else "undecided")
+    assert decision.share(tried[0]) == 0.0 and "shape" in decision.why[id(tried[0])]
+    if named:
+        assert decision.winner is tried[1] and 0.1 < decision.share(tried[1]) < 0.5 and not decision.why[id(tried[1])]
+
+
+@pytest.mark.parametrize(("forgiven", "named"), [(False, "stiffness_drift"), (True, "coulomb")])
+def test_where_none_is_right_no_law_of_time_leads(forgiven: bool, named: str):
+    tried = [trial(9000.0, 0.004, "coulomb"), trial(9900.0, 0.0005, "stiffness_drift")]
+    tried[1].laws = (SimpleNamespace(timed=True, at=(0, 1), otherwise=lambda stiffness: ""),)
+    tried[1].structure = SimpleNamespace(terms=(), stiffness_of=lambda at: 1.0)
+    decision = decide(GIVEN, REFITTED, tried, lambda t: None, lambda t: 0.0, periods=100.0, forgiven=forgiven)
+    assert decision.verdict == "cause" and decision.winner.effects[0].cause.id == named
+
+
+@pytest.mark.parametrize(("forgiven", "verdict"), [(False, "unnamed"), (True, "cause")])
+def test_where_none_is_right_a_map_of_the_rest_does_not_speak_against_a_law_that_explains_nearly_all(forgiven, verdict):
+    found = trial(9000.0, 0.004, "coulomb")
+    mapped = trial(-np.inf, 0.001)
+    decision = decide(GIVEN, REFITTED, [found], lambda t: mapped, lambda t: 0.0, periods=100.0, forgiven=forgiven)
+    assert decision.verdict == verdict

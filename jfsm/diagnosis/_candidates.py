@@ -139,6 +139,12 @@ def promising(tried: Sequence[Candidate]) -> tuple[list[Candidate], list[Candida
     return chosen, [c for c in tried if c.effects not in fitted]
 
 
+def contained(laws: Sequence[AbstractTerm], among: Sequence[Candidate]) -> list[Candidate]:
+    """Candidates whose law is what one of `laws` is for certain of its numbers, at the same place."""
+    found = {(law.at, kind) for law in laws for kind in law.contains}
+    return [c for c in among if len(c.effects) == 1 and (c.effects[0].at, c.effects[0].cause.effect) in found]
+
+
 class Laws:
     """Laws placed where they explain most of what a structure lacks."""
 

@@ -29,7 +29,7 @@ NEGLIGIBLE = 0.02
 """Excess, as a share of the signal, below which nothing but a perfect explanation is a finding."""
 _NOTICEABLE = 0.1
 """Excess, as a share of the power that noise leaves, from which a set says anything about an effect."""
-_NEARLY_ALL, _MUCH = 0.8, 0.1
+NEARLY_ALL, _MUCH = 0.8, 0.1
 """A law that explains less than this share of the excess and leaves more than this share of the signal is near."""
 _ALMOST_ALL = 0.95
 """A law that explains this share of the excess along an imposed motion stands, whatever a map makes of the rest."""
@@ -40,6 +40,10 @@ _UNFIT_SHARE = {1: 0.1, 2: 0.05}
 """and share of the nats that its last effect gains, of one effect or two: two together stand for many a single law."""
 _UNFIT_OF_WHITE = 0.005
 """The same where innovations are white: all else is right then."""
+_NOT_RIGHT = "explains much of it, but is not of the right shape"
+_ALIKE = 0.3
+"""Probability of another law of its family, in those of a law that is not of the right shape, that may take its place.
+"""
 _NEAR = 0.01
 """Distance to the farthest own value, as a share of it, from which a value is there."""
 _WHITE = 0.1
@@ -149,18 +153,23 @@ def decide(
     periods: float,
     *,
     imposed: bool = False,
+    forgiven: bool = False,
 ) -> Decision:
     """Verdict over the model as given, the model refitted, every candidate, and a map that stands for any law.
 
     `stand_in` adds to a trial the map of what it leaves; it is asked only where the winner leaves something.
     `lack_of_fit` tells what other laws would explain beside a trial's; it is asked of a cause that would be named.
-    Along an `imposed` motion a map repeats even the small faults of a law, one by one, as often as it repeats itself.
+    Where some force is `forgiven` to all none of them is right: laws of time would explain whatever is left, and a map
+    of the little that a law leaves does not speak against it. Along an `imposed` motion a map repeats even the small
+    faults of a law, one by one, as often as it repeats itself.
     """
     kappa, why = {}, {}
     passing = []
     for t in tried:
         kappa[id(t)] = explained(t, refitted)
         why[id(t)] = _reason(t, given, refitted) or _needs_both(t, tried, refitted)
+        if forgiven and any(law.timed for law in t.laws):
+            why[id(t)] = why[id(t)] or "depends on time, and no second record shows the same"
         if not why[id(t)]:
             passing.append(t)
     alternatives = [given, refitted, *passing]
@@ -171,6 +180,7 @@ def decide(
         if t is not winner:
             why[id(t)] = "explains it too, but is less probable"
     stands = imposed and bool(winner.effects) and _almost_all(winner, refitted)
+    stands |= forgiven and bool(winner.effects) and explained(winner, refitted) >= NEARLY_ALL
     mapped = None if adequate(winner) or stands else stand_in(winner)
     verdict = _verdict(given, refitted, winner, tried, mapped)
     family = sum(chance[id(t)] for t in passing if families(t) == families(winner))
@@ -181,10 +191,25 @@ def decide(
         verdict = "undecided"
     if verdict == "cause":
         fewer = [t.evidence for t in (given, refitted, *tried) if len(t.effects) < len(winner.effects)]
-        doubt = _doubt(winner, winner.evidence - max(fewer), lack_of_fit(winner))
-        chance[id(winner)] *= 1.0 - 0.5 * min(doubt, 1.0)
+
+        def doubt_of(t: Trial) -> float:
+            return _doubt(t, t.evidence - max(fewer), lack_of_fit(t))
+
+        doubt = doubt_of(winner)
+        if doubt > 1.0 and not adequate(winner):
+            # Predictions alone hardly tell one law from another of its kind; of these, the one whose shape is right.
+            alike = [t for t in passing if t is not winner and families(t) == families(winner)]
+            alike = [t for t in alike if chance[id(t)] > _ALIKE * chance[id(winner)]]
+            for t in sorted(alike, key=lambda t: -chance[id(t)]):
+                if (other := doubt_of(t)) <= 1.0:
+                    why[id(winner)], why[id(t)] = _NOT_RIGHT, ""
+                    chance[id(winner)], winner, doubt = 0.0, t, other
+                    break
+        for t in passing:
+            if families(t) == families(winner):
+                chance[id(t)] *= 1.0 - 0.5 * min(doubt, 1.0)
         if doubt > 1.0:
-            why[id(winner)], chance[id(winner)] = "explains much of it, but is not of the right shape", 0.0
+            why[id(winner)], chance[id(winner)] = _NOT_RIGHT, 0.0
             mapped = stand_in(refitted)
             stands_in = mapped is not None and explained(mapped, refitted) >= GATE
             verdict, winner = ("unnamed", refitted) if stands_in else ("undecided", winner)
@@ -270,7 +295,7 @@ def _verdict(given: Trial, refitted: Trial, winner: Trial, tried: Sequence[Trial
     stands_in = mapped is not None and explained(mapped, winner) >= GATE
     if winner.effects:
         # The nearest neighbour of a law that is not in the catalogue explains much of it, and leaves much.
-        short = explained(winner, refitted) < _NEARLY_ALL and winner.prediction.left > _MUCH
+        short = explained(winner, refitted) < NEARLY_ALL and winner.prediction.left > _MUCH
         return "unnamed" if stands_in else "undecided" if short else "cause"
     if stands_in:
         return "unnamed"

@@ -1,6 +1,5 @@
 """From a record and a model to a verdict."""
 
-import math
 import secrets
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -13,20 +12,21 @@ from ..dynamics import Reconstruction
 from ..identification import Nuisances, prepare_all
 from ..records import Record
 from ..structures import AccelerationGain, Cause, ForceGain, Structure
-from ._candidates import Candidate, candidates, chosen_causes, promising
+from ._candidates import Candidate, candidates, chosen_causes, contained, promising
 from ._chance import beside_chance, noise_levels
 from ._clipped import beside_clipping, limited
-from ._decide import NEGLIGIBLE, decide, something_left, strained, white
+from ._decide import GATE, NEGLIGIBLE, decide, explained, something_left, strained, white
 from ._detectable import also_detectable
 from ._diagnosis import Diagnosis
 from ._effect import Effect
+from ._forgiving import forgiving
 from ._gain import Gain, measure_gain
 from ._holdout import split
 from ._lack_of_fit import lack_of_fit
 from ._next import Leading
 from ._report import Tested, assemble
 from ._residual import residual, stand_in
-from ._search import fit_model, search, search_pairs
+from ._search import LeftBehind, fit_model, search, search_pairs
 from ._trial import Trial
 
 _HEAVIER = 0.03
@@ -109,6 +109,11 @@ def diagnose(
     tried, left_out = promising(every)
     imposed = records[0].path is not None
     trials, behind = search(tried, model, given, refitted, records, until, steps.next)
+    close = [t for t in trials if explained(t, refitted) >= GATE]
+    if within := contained([law for t in close for law in t.laws], left_out):
+        found = search(within, model, given, refitted, records, until, steps.next)
+        trials, behind = [*trials, *found.trials], [*behind, *found.behind]
+        left_out = [c for c in left_out if c not in within]
     trials = [t.beside(refitted) for t in trials]
     given, refitted, *trials = beside_chance([given, refitted, *trials], model, records, until, key)
     lack = partial(lack_of_fit, records=records, until=until)
@@ -119,9 +124,18 @@ def diagnose(
         every_trial, behind = [given, refitted, *trials, *together], behind + found.behind
         given, refitted, *trials = beside_chance(every_trial, model, records, until, key)
     steps.next("the verdict")
-    periods = sum(n.record.duration for n in records) * records[0].omega / (2 * math.pi)
+    periods = sum(n.record.duration / n.period for n in records)
     mapped = partial(stand_in, records=records, until=until)
     decision = decide(given, refitted, trials, mapped, lack, periods, imposed=imposed)
+    again = None if decision.winner.effects else forgiving([given, refitted, *trials], records, until)
+    if again is not None:
+        best, before = min(t.rung for t in trials), trials
+        records, (given, refitted, *trials) = again
+        compared = {t.effects for t in trials}
+        behind = [*behind, *(LeftBehind(t.effects, t.rung - best) for t in before if t.effects not in compared)]
+        mapped = partial(stand_in, records=records, until=until)
+        lack = partial(lack_of_fit, records=records, until=until)
+        decision = decide(given, refitted, trials, mapped, lack, periods, forgiven=True)
     if clipped:
         decision = beside_clipping(decision, clipped, refitted)
     first = records[0]

@@ -78,7 +78,8 @@ def _shapes(trial: Trial, posterior: Posterior, links: Sequence[tuple[int, int]]
 def _shown(trial: Trial, posterior: Posterior, index: int, shapes: np.ndarray) -> _Shown:
     """What each unknown and each shape (shapes, n, dof) does to record `index`."""
     nuisances, theta = posterior.records[index], trial.theta
-    base = posterior.innovations(theta, index)
+    slack = nuisances.forgiven
+    base = posterior.innovations(theta, index, slack=slack)
     error, deviation = np.asarray(base.error), np.sqrt(np.maximum(base.variance, 1e-300))
     counted = np.asarray(nuisances.readings.use)[: len(error)] > 0
     counted[0], counted[posterior.until[index] :] = False, False  # the start is an unknown
@@ -94,11 +95,11 @@ def _shown(trial: Trial, posterior: Posterior, index: int, shapes: np.ndarray) -
             return np.zeros(np.count_nonzero(counted))
         change = _NUDGE * max(math.sqrt(max(trial.covariance[k, k], 0.0)), 1e-9)
         nudged = theta + change * (np.arange(theta.size) == k)
-        return moved(posterior.innovations(nudged, index).error, change)
+        return moved(posterior.innovations(nudged, index, slack=slack).error, change)
 
     def by_shape(shape: np.ndarray) -> np.ndarray:
         push = -_SMALL * nuisances.elastic_force(trial.structure) * shape
-        return moved(posterior.innovations(theta, index, push=push).error, _SMALL)
+        return moved(posterior.innovations(theta, index, push=push, slack=slack).error, _SMALL)
 
     unknowns, forces = side_by_side(by_unknown, range(theta.size)), side_by_side(by_shape, shapes)
     return _Shown(ours(error), np.stack(list(unknowns), 1), np.stack(list(forces), 1))

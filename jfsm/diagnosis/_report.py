@@ -1,6 +1,7 @@
 """A decision put into values, words and plain data."""
 
 import math
+from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, NamedTuple
 
@@ -227,7 +228,7 @@ def _words(decision: Decision, findings: tuple[Finding, ...], gain: Gain | None,
         return f"The form of the model is right, its values are off: {what}.{share}", "Use the refitted values."
     if decision.verdict == "cause":
         known = dict(causes()) | {e.cause.id: e.cause for e in decision.winner.effects}
-        said = " ".join(_said(f, known[f.cause]) for f in findings)
+        said = " ".join(_said(f, known) for f in findings)
         return f"{said}{_remainder(decision.winner)}{share}", "Use the extended model."
     if decision.verdict == "unnamed":
         return (
@@ -249,11 +250,15 @@ def _remainder(winner: Trial) -> str:
     return f" Something is left beyond {'them' if len(winner.effects) > 1 else 'it'}: {left:.1%} of the signal."
 
 
-def _said(finding: Finding, cause: Cause) -> str:
-    """A finding as a sentence."""
-    where = "-".join(map(str, finding.at))
+def _said(finding: Finding, known: Mapping[str, Cause]) -> str:
+    """A finding as a sentence, or two where its name is open."""
+    cause, where = known[finding.cause], "-".join(map(str, finding.at))
     lacks = "The record shows" if cause.is_sensor else "The model lacks"
-    return f"{lacks} {cause.label} at {where}: {finding.sentence}."
+    said = f"{lacks} {cause.label} at {where}: {finding.sentence}."
+    if finding.probability >= 0.5 or not finding.rivals:
+        return said
+    others = [known[r.cause].label for r in finding.rivals if r.cause in known]
+    return f"{said} By this record it may as well be {' or '.join(dict.fromkeys(others))}."
 
 
 def _record(records: list[Nuisances]) -> dict[str, Any]:

@@ -155,18 +155,19 @@ def predict(posterior: Posterior, theta: np.ndarray, slight: bool = False) -> Pr
         errors, expected, scatter = [], [], []
         for index, nuisances in enumerate(posterior.records):
             use, scored = _windows(nuisances)
+            extent = _extent(nuisances, scored)
             found = posterior.innovations(theta, index, use=use, noise_scales=False, slack=slack)
             truth = found if slack == 0 else posterior.innovations(theta, index, use=use, noise_scales=False)
             alive = np.asarray(nuisances.readings.use)[: nuisances.samples] > 0
             for chosen in sets(nuisances, posterior.until[index]):
                 mask = (scored & chosen)[:, None] & alive
                 count = np.maximum(mask.sum(0), 1)
-                share = np.clip(found.error / nuisances.spread, -_RUN_AWAY, _RUN_AWAY)
+                share = np.clip(found.error / extent, -_RUN_AWAY, _RUN_AWAY)
                 errors.append(np.sum(np.sum(np.where(mask, share**2, 0.0), 0) / count))
-                noise = np.sum(np.where(mask, truth.variance, 0.0), 0) / count / nuisances.spread**2
-                white = np.minimum(np.asarray(nuisances.readings.variance) / nuisances.spread**2, noise)
+                noise = np.sum(np.where(mask, truth.variance, 0.0), 0) / count / extent**2
+                white = np.minimum(np.asarray(nuisances.readings.variance) / extent**2, noise)
                 # Readings err each by itself, a state that was filtered for a whole window: in two directions.
-                windows = np.maximum(count * nuisances.record.dt * nuisances.omega / (2 * np.pi * _PREDICTED), 1.0)
+                windows = np.maximum(count * nuisances.record.dt / (nuisances.period * _PREDICTED), 1.0)
                 expected.append(np.sum(noise))
                 scatter.append(np.sqrt(np.sum(2 * white**2 / count + (noise - white) ** 2 / windows)))
         error = np.nan_to_num(np.array(errors), nan=np.inf)
@@ -186,12 +187,22 @@ def _windows(nuisances: Nuisances) -> tuple[np.ndarray, np.ndarray]:
     """Which samples the filter uses, and which it predicts freely: all of them along an imposed motion."""
     if nuisances.path is not None:
         return np.zeros((nuisances.samples, len(nuisances.channels))), np.ones(nuisances.samples, bool)
-    n, period = nuisances.samples, 2 * np.pi / (nuisances.omega * nuisances.record.dt)
+    n, period = nuisances.samples, nuisances.period / nuisances.record.dt
     period = min(period, n / (2 * (_FILTERED + _PREDICTED)))
     phase = np.arange(n) % max(int(round((_FILTERED + _PREDICTED) * period)), 2)
     free = (phase >= int(round(_FILTERED * period))) & (np.arange(n) < n - _LATE)
     channels = len(nuisances.channels)
     return np.repeat((~free)[:, None], channels, 1).astype(float), free
+
+
+def _extent(nuisances: Nuisances, free: np.ndarray) -> np.ndarray:
+    """Spread (channels,) of the readings; where a window is but a part of a slow motion, of those in a window."""
+    if nuisances.period * nuisances.omega >= 2 * np.pi * (1 - 1e-9):
+        return nuisances.spread
+    values = np.asarray(nuisances.readings.values)[: nuisances.samples]
+    windows = np.split(values, np.flatnonzero(np.diff(free.astype(int))) + 1)
+    about = np.concatenate([window - window.mean(0) for window in windows])
+    return np.minimum(np.std(about[free], 0), nuisances.spread)
 
 
 def whiteness(posterior: Posterior, theta: np.ndarray) -> float:

@@ -74,6 +74,11 @@ def finish(posterior: Posterior, start: Maximum, steps: int = 25, best: float = 
     return _climb(posterior, theta, 0.0, steps, _ENOUGH, best)
 
 
+def settle(posterior: Posterior, theta: np.ndarray) -> Maximum:
+    """Climb from values (unknowns,) that are near the top, of a hypothesis with one start."""
+    return _climb(posterior, theta[None], 0.0, 25, _ENOUGH)
+
+
 def maximise(posterior: Posterior) -> Maximum:
     """The most probable values, from every start."""
     return finish(posterior, approach(posterior))

@@ -39,6 +39,8 @@ _OVERSAMPLED = 3
 _MOSTLY = 0.5
 _SAME = 1e-9
 """Rounding, relative."""
+_STOPPED = 1 / 3
+"""Share of the time in which damping stops a motion, where nothing is elastic, that counts as a period."""
 _STRETCH = 0.25
 """Share of a channel's samples, one after the other, that are enough to read its noise from."""
 
@@ -63,10 +65,15 @@ class Nuisances:
         signal fills its band.
     length, omega : float
         Size of the motion [length unit] and its angular frequency [rad/s]: the scales of priors.
+    period : float
+        Time over which a structure forgets how it moved, as far as a prediction is asked of it [s]: a period, and where
+        nothing is elastic as much of the time in which damping stops it.
     crest : float
         Largest reading over the standard deviation, in the channel closest to a displacement.
     x0, v0 : (dof,) arrays
         First guess of the initial state; `at_rest` says that it is known.
+    forgiven : float
+        Share of the elastic force that no hypothesis has to explain: what all of them lack.
     """
 
     record: Record
@@ -82,12 +89,14 @@ class Nuisances:
     length: float
     crest: float
     omega: float
+    period: float
     x0: np.ndarray
     v0: np.ndarray
     at_rest: bool
     reconstruction: Reconstruction
     notes: tuple[str, ...]
     path: Path | None = None
+    forgiven: float = 0.0
     _heads: dict[int, tuple[Fine | Imposed, Readings]] = field(default_factory=dict, init=False, repr=False)
 
     @property
@@ -210,6 +219,7 @@ def prepare(
         length=length,
         crest=crest,
         omega=omega,
+        period=_period(model, omega),
         x0=x0,
         v0=v0,
         at_rest=record.at_rest,
@@ -278,6 +288,7 @@ def _prepare_imposed(record: Record, model: Structure, reconstruction: Reconstru
         length=length,
         crest=crest,
         omega=omega,
+        period=2 * math.pi / omega,
         x0=none,
         v0=none,
         at_rest=True,
@@ -374,6 +385,15 @@ def _drive(record: Record, model: Structure, reconstruction: Reconstruction, for
 def _rate(y: np.ndarray, dt: float) -> float:
     """Angular frequency at which a channel goes up and down, where no spring tells one [rad/s]."""
     return float(np.std(np.diff(y)) / (dt * np.std(y)))
+
+
+def _period(model: Structure, omega: float) -> float:
+    """A period of the motion; where nothing is elastic, a part of the time in which damping stops it."""
+    plant = lower(model)
+    rates = np.abs(np.linalg.eigvals(np.linalg.solve(_mass(model), np.asarray(plant.damping))))
+    if fastest_mode(plant) > 0 or not np.all(rates > 0):
+        return 2 * math.pi / omega
+    return _STOPPED / float(np.max(rates))
 
 
 def _force(record: Record, model: Structure) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:

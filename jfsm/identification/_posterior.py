@@ -89,7 +89,8 @@ class Posterior:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Minus log-posterior (lanes,), gradient and information.
 
-        `slack` is the share of unmodelled force forgiven; of every record at most `most` samples count.
+        `slack` is the share of unmodelled force forgiven, no less than the record's own; of every record at most `most`
+        samples count.
         """
         return self._evaluate(theta, slack, most)[:3]
 
@@ -114,7 +115,7 @@ class Posterior:
                 nuisances.show,
                 fine,
                 readings,
-                slackened(nuisances, slack),
+                slackened(nuisances, max(slack, nuisances.forgiven)),
                 _doubt(plant, nuisances),
                 jnp.asarray(until),  # as a plain number it would be part of the program
             )

@@ -116,6 +116,10 @@ class AbstractTerm(eqx.Module):
     states: ClassVar[int] = 0
     hangs: ClassVar[bool] = False
     """Whether it hangs on one mass, at ``(0, j)``, and not between two."""
+    timed: ClassVar[bool] = False
+    """Whether its force depends on the time itself."""
+    contains: ClassVar[tuple[type["AbstractTerm"], ...]] = ()
+    """Laws that this one is for certain of its numbers."""
     base: ClassVar[tuple[float, ...]] = ()
     """Share of the base's acceleration that each hidden state loses: 1 for the velocity of a mass of its own."""
 

@@ -29,6 +29,7 @@ class PeriodicDisturbance(AbstractTerm):
     phase: Scalar = eqx.field(converter=as_scalar)
     at: tuple[int, int] = eqx.field(converter=as_link, static=True, kw_only=True)
     kind = "periodic_disturbance"
+    timed = True
     parameters = (
         Parameter("F", force=1, meaning="amplitude of the force"),
         Parameter("omega", time=-1, meaning="angular frequency, in rad"),

@@ -7,6 +7,8 @@ from ..._types import as_scalar
 from .._term import ABOVE_ZERO, AbstractTerm, Parameter, Scalar, as_link
 
 _TINY = 1e-30
+_DRY = 0.06
+"""Exponent of the speed below which it tells nothing of the speed."""
 
 
 class QuadraticDamping(AbstractTerm):
@@ -40,6 +42,7 @@ class PowerDamping(AbstractTerm):
     n: Scalar = eqx.field(converter=as_scalar)
     at: tuple[int, int] = eqx.field(converter=as_link, static=True, kw_only=True)
     kind = "power_damping"
+    contains = (QuadraticDamping, CubicDamping)
     parameters = (
         Parameter("c", force=1, meaning="power-law damping", words="{force} ({time}/{length})^n"),
         Parameter("n", meaning="exponent of the speed", least=ABOVE_ZERO, low=0.05, high=6.0),
@@ -49,6 +52,9 @@ class PowerDamping(AbstractTerm):
         # At w = 0 the slope is infinite for n < 1; a speed that is nothing stands for it.
         speed = jnp.where(jnp.abs(w) > _TINY, jnp.abs(w), _TINY)
         return self.c * jnp.sign(w) * speed**self.n
+
+    def otherwise(self, stiffness):
+        return "with so small an exponent it is dry friction" if self.n < _DRY else ""
 
     @classmethod
     def shapes(cls, scale):

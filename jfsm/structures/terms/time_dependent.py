@@ -17,6 +17,7 @@ class StiffnessDrift(AbstractTerm):
     t_ref: Scalar = eqx.field(converter=as_scalar)
     at: tuple[int, int] = eqx.field(converter=as_link, static=True, kw_only=True)
     kind = "stiffness_drift"
+    timed = True
     parameters = (Parameter("rate", force=1, length=-1, time=-1, positive=False, meaning="stiffness rate"), _ORIGIN)
 
     def force(self, d, w, z, t):
@@ -34,6 +35,7 @@ class DampingDrift(AbstractTerm):
     t_ref: Scalar = eqx.field(converter=as_scalar)
     at: tuple[int, int] = eqx.field(converter=as_link, static=True, kw_only=True)
     kind = "damping_drift"
+    timed = True
     parameters = (Parameter("rate", force=1, length=-1, positive=False, meaning="damping rate"), _ORIGIN)
 
     def force(self, d, w, z, t):
@@ -56,6 +58,7 @@ class StiffnessDrop(AbstractTerm):
     ramp: Scalar = eqx.field(converter=as_scalar, default=0.0)
     at: tuple[int, int] = eqx.field(converter=as_link, static=True, kw_only=True)
     kind = "stiffness_drop"
+    timed = True
     parameters = (
         Parameter("dk", force=1, length=-1, positive=False, meaning="stiffness lost"),
         Parameter("t_star", time=1, positive=False, meaning="instant of the loss"),
@@ -84,6 +87,7 @@ class ParametricStiffness(AbstractTerm):
     phase: Scalar = eqx.field(converter=as_scalar)
     at: tuple[int, int] = eqx.field(converter=as_link, static=True, kw_only=True)
     kind = "parametric_stiffness"
+    timed = True
     parameters = (
         Parameter("dk", force=1, length=-1, meaning="amplitude of the stiffness"),
         Parameter("omega", time=-1, meaning="angular frequency, in rad"),

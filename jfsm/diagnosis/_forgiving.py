@@ -1,0 +1,57 @@
+"""Hypotheses none of which is right, compared where that much of the force is forgiven to all of them."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .._threads import side_by_side
+from ..identification import Maximum, Nuisances, settle
+from ._decide import NEARLY_ALL, explained
+from ._trial import Trial, predict, trial
+
+_SHARES = (0.03, 0.01, 0.003, 0.001)
+"""Shares of the elastic force that may be forgiven."""
+_WORSE = 1.25
+"""Error of the best hypothesis' predictions, in errors from noise alone, from which forgiving leads it astray."""
+_COMPARED = 12
+"""Hypotheses that are compared, the best of them where a hundredth was forgiven."""
+
+
+def forgiving(
+    trials: Sequence[Trial], records: Sequence[Nuisances], until: Sequence[int]
+) -> tuple[list[Nuisances], list[Trial]] | None:
+    """The records with the share forgiven that makes the best hypothesis most probable, and the best trials there.
+
+    From the noise alone a hypothesis that lacks a little ends at values that make up for it, or nowhere, and no two of
+    them can be compared: one predicts far better than the model, and is less probable. None where that is not so, or
+    noise alone does as well. `trials` begin with the model as given and refitted.
+    """
+    given, refitted, *others = trials
+    least = max(given.evidence, refitted.evidence)
+    if not any(t.evidence < least and explained(t, refitted) >= NEARLY_ALL for t in others):
+        return None
+    leader = min(trials, key=lambda t: t.rung)
+    climbed = {share: _settled(leader, records, until, share) for share in _SHARES}
+    best = min(climbed, key=lambda share: climbed[share].value[0])
+    if climbed[best].value[0] >= leader.value:
+        return None
+    noise_alone, records = leader.prediction, [replace(n, forgiven=best) for n in records]
+    posterior = leader.posterior(records, until)
+    error = predict(posterior, climbed[best].theta[0], slight=not leader.effects).error
+    if np.any(error > _WORSE**2 * noise_alone.error):
+        return None
+    compared = [given, refitted, *sorted(others, key=lambda t: t.rung)[:_COMPARED]]
+
+    def again(one: Trial) -> Trial:
+        posterior = one.posterior(records, until)
+        found = settle(posterior, one.theta)
+        return trial(posterior, found, 0, float(found.value[0]), one.label, one.effects)
+
+    given, refitted, *others = [again(compared[0]), *side_by_side(again, compared[1:])]
+    return records, [given, refitted, *(t.beside(refitted) for t in others)]
+
+
+def _settled(one: Trial, records: Sequence[Nuisances], until: Sequence[int], share: float) -> Maximum:
+    forgiven = [replace(n, forgiven=share) for n in records]
+    return settle(one.posterior(forgiven, until), one.theta)
