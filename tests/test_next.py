@@ -1,5 +1,8 @@
 """What to measure next: the advised test is done on the plant itself, and tells the rivals apart."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import jax
 import numpy as np
 import pytest
@@ -7,7 +10,8 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 import jfsm
-from jfsm.diagnosis._next import Leading, Variation, _tried
+from jfsm.diagnosis._next import Leading, Variation, _tried, same_force
+from jfsm.identification import prepare
 
 MASS, STIFFNESS, DAMPING = 1.0, 40.0, 0.5
 BELIEVED = jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING)
@@ -63,6 +67,32 @@ def test_what_nothing_competes_with_needs_no_other_test(undecided):
     args = (leading.model, leading.rivals, lambda t: shares[id(t)], leading.nuisances, leading.samples)
     assert Leading.of(*args) is None
     assert Leading.of(args[0], leading.rivals[:1], *args[2:]) is None
+
+
+def explained_by(law, damping: float, cause: str) -> Any:
+    structure = jfsm.Structure.sdof(MASS, STIFFNESS, damping) + law
+    return SimpleNamespace(structure=structure, laws=(law,), effects=(cause,))
+
+
+def test_a_law_that_is_another_for_its_numbers_is_no_rival_that_a_test_could_tell_from_it():
+    cubic = explained_by(jfsm.CubicDamping(0.3, at=(0, 1)), DAMPING, "cubic_damping")
+    power = explained_by(jfsm.PowerDamping(0.3, 3.002, at=(0, 1)), DAMPING, "power_damping")
+    other = explained_by(jfsm.PowerDamping(0.3, 2.6, at=(0, 1)), DAMPING, "power_damping")
+    record = jfsm.Record(np.arange(400) * 0.05, np.cos(np.arange(400)), np.sin(0.3 * np.arange(400)))
+    nuisances = prepare(record, BELIEVED)
+    assert same_force(cubic, power, nuisances) and not same_force(cubic, other, nuisances)
+    shares = {id(cubic): 0.5, id(power): 0.3, id(other): 0.1}
+    leading = Leading.of(BELIEVED, [other, power, cubic], lambda t: shares[id(t)], nuisances, 300)
+    assert leading is not None and leading.rivals == (cubic, other)
+    assert Leading.of(BELIEVED, [power, cubic], lambda t: shares[id(t)], nuisances, 300) is None
+
+
+def test_damping_that_turns_positive_is_damping_that_grows_beside_less_of_its_own():
+    eps, x0 = 0.2, 0.5
+    turning = explained_by(jfsm.VanDerPol(eps, x0, at=(0, 1)), DAMPING + eps, "van_der_pol")
+    growing = explained_by(jfsm.PositionDamping(eps / x0**2, at=(0, 1)), DAMPING, "position_damping")
+    record = jfsm.Record(np.arange(400) * 0.05, np.cos(np.arange(400)), np.sin(0.3 * np.arange(400)))
+    assert same_force(turning, growing, prepare(record, BELIEVED))
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from functools import partial
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from .._result import Result
@@ -19,7 +20,7 @@ from .._threads import side_by_side
 from ..dynamics import simulate
 from ..identification import LADDER, Nuisances, Posterior, approach, finish, lanes_of, prepare
 from ..records import Record
-from ..structures import Structure
+from ..structures import AbstractTerm, Structure
 from ._candidates import hypothesis
 from ._chance import noise_levels
 from ._decide import SIGNIFICANT
@@ -30,6 +31,10 @@ RIVAL = 0.02
 """Probability from which another explanation is a rival."""
 _LEVELS, _SPEEDS, _SHIFTS = (0.25, 0.5, 2.0, 4.0), (0.7, 1.4), (0.5, -0.5)
 """How much larger and faster the drive of a test may be, and a constant force beside it in its rms."""
+_SIDE = 21
+"""States to a side on which forces are compared,"""
+_SAME = 0.02
+"""and share of a law's force up to which two are the same."""
 _KINDS = ("displacement", "velocity", "acceleration")
 
 
@@ -109,11 +114,10 @@ class Leading:
         nuisances: Nuisances,
         until: int,
     ) -> "Leading | None":
-        """The two most probable of the trials, where both have a chance."""
-        first = sorted(trials, key=share, reverse=True)[:2]
-        if len(first) < 2 or share(first[1]) < RIVAL:
-            return None
-        return cls(model, (first[0], first[1]), nuisances, until)
+        """The most probable of the trials and the next that is another force, where both have a chance."""
+        first, *others = sorted(trials, key=share, reverse=True)
+        second = next((t for t in others if share(t) >= RIVAL and not same_force(first, t, nuisances)), None)
+        return None if second is None else cls(model, (first, second), nuisances, until)
 
     def tests(self) -> list[Variation]:
         """Tests that could be made with this structure."""
@@ -150,6 +154,30 @@ def _tried(leading: Leading, test: Variation, words: str, key: jax.Array) -> lis
         return []
     nats = min(separation(leading, first), -separation(leading, second))
     return [Proposal(words, nats, _reach(leading, clean), (leading.rivals[0].name, leading.rivals[1].name), clean)]
+
+
+def same_force(one: Trial, other: Trial, nuisances: Nuisances) -> bool:
+    """Whether two explanations are one force under two names wherever a test may lead, as one law may contain another.
+
+    Only what displacement and velocity tell is compared, of one degree of freedom.
+    """
+    laws = [*one.laws, *other.laws]
+    if len(one.laws) != len(one.effects) or len(other.laws) != len(other.effects) or one.structure.dof > 1:
+        return False
+    if not (one.laws and other.laws) or any(law.states or law.timed or law.delay is not None for law in laws):
+        return False
+    farthest = max(_LEVELS) * nuisances.crest * nuisances.length
+    side = jnp.linspace(-1.0, 1.0, _SIDE)
+    d, w = (a.ravel() for a in jnp.meshgrid(farthest * side, farthest * nuisances.omega * side))
+
+    def force(terms: Sequence[AbstractTerm]) -> np.ndarray:
+        zero = jnp.zeros(())
+        each = [jax.vmap(lambda d, w, term=term: term.force(d, w, (), zero))(d, w) for term in terms]
+        return np.asarray(sum(each, jnp.zeros(d.shape)))
+
+    per_mass = [force(t.structure.terms) / float(np.ravel(t.structure.mass)[0]) for t in (one, other)]
+    added = force(one.laws) / float(np.ravel(one.structure.mass)[0])
+    return _rms(per_mass[0] - per_mass[1]) < _SAME * _rms(added)
 
 
 def separation(leading: Leading, record: Record) -> float:
