@@ -174,3 +174,14 @@ def test_where_none_is_right_a_map_of_the_rest_does_not_speak_against_a_law_that
     mapped = trial(-np.inf, 0.001)
     decision = decide(GIVEN, REFITTED, [found], lambda t: mapped, lambda t: 0.0, periods=100.0, forgiven=forgiven)
     assert decision.verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("nats", "left", "verdict"),
+    [(15.0, 0.0, "parameters"), (55.0, 0.0, "undecided"), (150.0, 1e-3, "parameters"), (250.0, 1e-3, "undecided")],
+)
+def test_own_values_are_not_the_cause_where_other_shapes_would_explain_more(nats: float, left: float, verdict: str):
+    refitted = trial(10_000.0, left)
+    decision = decide(GIVEN, refitted, [], lambda t: None, lambda t: nats, periods=100.0)
+    assert decision.verdict == verdict and decision.winner is refitted
+    assert (decision.share(refitted) > 0.5) == (verdict == "parameters")

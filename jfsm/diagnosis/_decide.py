@@ -36,8 +36,9 @@ _ALMOST_ALL = 0.95
 _UNFIT = 20.0
 """Nats that laws of other shapes must gain beside a cause, beyond chance, for it to be doubted; twice as many, for it
 not to be named,"""
-_UNFIT_SHARE = {1: 0.1, 2: 0.05}
-"""and share of the nats that its last effect gains, of one effect or two: two together stand for many a single law."""
+_UNFIT_SHARE = {0: 0.02, 1: 0.1, 2: 0.05}
+"""and share of the nats that its last effect gains, of own values, one effect or two: own values make up for many a
+law, and two together stand for many a single one."""
 _UNFIT_OF_WHITE = 0.005
 """The same where innovations are white: all else is right then."""
 _NOT_RIGHT = "explains much of it, but is not of the right shape"
@@ -195,16 +196,10 @@ def decide(
         def doubt_of(t: Trial) -> float:
             return _doubt(t, t.evidence - max(fewer), lack_of_fit(t))
 
-        doubt = doubt_of(winner)
-        if doubt > 1.0 and not adequate(winner):
-            # Predictions alone hardly tell one law from another of its kind; of these, the one whose shape is right.
-            alike = [t for t in passing if t is not winner and families(t) == families(winner)]
-            alike = [t for t in alike if chance[id(t)] > _ALIKE * chance[id(winner)]]
-            for t in sorted(alike, key=lambda t: -chance[id(t)]):
-                if (other := doubt_of(t)) <= 1.0:
-                    why[id(winner)], why[id(t)] = _NOT_RIGHT, ""
-                    chance[id(winner)], winner, doubt = 0.0, t, other
-                    break
+        leader = winner
+        winner, doubt = _of_right_shape(leader, passing, chance, doubt_of)
+        if winner is not leader:
+            why[id(leader)], chance[id(leader)], why[id(winner)] = _NOT_RIGHT, 0.0, ""
         for t in passing:
             if families(t) == families(winner):
                 chance[id(t)] *= 1.0 - 0.5 * min(doubt, 1.0)
@@ -213,6 +208,11 @@ def decide(
             mapped = stand_in(refitted)
             stands_in = mapped is not None and explained(mapped, refitted) >= GATE
             verdict, winner = ("unnamed", refitted) if stands_in else ("undecided", winner)
+    if verdict == "parameters":
+        doubt = _doubt(winner, winner.evidence - given.evidence, lack_of_fit(winner))
+        chance[id(winner)] *= 1.0 - 0.5 * min(doubt, 1.0)
+        if doubt > 1.0:
+            chance[id(winner)], verdict = 0.0, "undecided"
     if verdict == "consistent":
         winner = given
     elif verdict == "unnamed" and mapped is not None:
@@ -229,6 +229,23 @@ def decide(
 def families(t: Trial) -> list[str]:
     """Families of a trial's causes."""
     return sorted(effect.cause.family for effect in t.effects)
+
+
+def _of_right_shape(
+    winner: Trial, passing: Sequence[Trial], chance: dict[int, float], doubt_of: Callable[[Trial], float]
+) -> tuple[Trial, float]:
+    """The winner and its doubt; where that is too much, those of another law of its kind, if there is less of it.
+
+    Predictions that all leave something hardly tell one law from another of its kind.
+    """
+    doubt = doubt_of(winner)
+    if doubt <= 1.0 or adequate(winner):
+        return winner, doubt
+    alike = [t for t in passing if t is not winner and families(t) == families(winner)]
+    for t in sorted(alike, key=lambda t: -chance[id(t)]):
+        if chance[id(t)] > _ALIKE * chance[id(winner)] and (other := doubt_of(t)) <= 1.0:
+            return t, other
+    return winner, doubt
 
 
 def _almost_all(t: Trial, refitted: Trial) -> bool:

@@ -19,6 +19,7 @@ from ._gain import Gain
 from ._next import RIVAL, Leading
 from ._residual import Residual, curves
 from ._search import LeftBehind
+from ._shape import Shape, shape_of
 from ._trial import Trial
 
 _SHOWN = 2000
@@ -66,7 +67,8 @@ def assemble(
     notes = tuple(dict.fromkeys(note for n in records for note in n.notes))
     noise = {f"{kind} {j}": float(s) for n in records[:1] for (kind, j), s in zip(n.channels, n.floor, strict=True)}
     smallest = _detectable(trials, tested.unseen, model, units)
-    sentence, advice = _words(decision, findings, gain, imposed=records[0].path is not None)
+    shape = None if decision.verdict == "consistent" else shape_of(missing)
+    sentence, advice = _words(decision, findings, gain, shape, imposed=records[0].path is not None)
     data = {
         "jfsm": _version(),
         "verdict": decision.verdict,
@@ -79,6 +81,7 @@ def assemble(
         "candidates": [_plain(c) for c in candidates],
         "refitted": {p: {"given": model.values()[p], **_plain(e)} for p, e in refit.items()},
         "gain": None if gain is None else _gain(gain),
+        "shape": None if shape is None else {**_plain(shape._asdict()), "words": shape.words},
         "notes": list(notes),
         "detectable": {c: {"parameter": p, "value": e.value, "unit": e.unit} for c, (p, e) in smallest.items()},
         "curves": {"holdout": _holdout(runs), **curves(missing, units, decision.named_term)},
@@ -214,7 +217,9 @@ def _passed_over(c: Candidate) -> CandidateResult:
     return CandidateResult(names(c.effects), places(c.effects), -math.inf, {}, share, 0.0, {}, why)
 
 
-def _words(decision: Decision, findings: tuple[Finding, ...], gain: Gain | None, *, imposed: bool) -> tuple[str, str]:
+def _words(
+    decision: Decision, findings: tuple[Finding, ...], gain: Gain | None, shape: Shape | None, *, imposed: bool
+) -> tuple[str, str]:
     error = "error of the predicted force" if imposed else "free-run error"
     share = (
         ""
@@ -231,8 +236,9 @@ def _words(decision: Decision, findings: tuple[Finding, ...], gain: Gain | None,
         said = " ".join(_said(f, known) for f in findings)
         return f"{said}{_remainder(decision.winner)}{share}", "Use the extended model."
     if decision.verdict == "unnamed":
+        looks = "" if shape is None else f" {shape.words}"
         return (
-            f"A real effect is there that no catalogue entry explains; a map stands in.{share}",
+            f"A real effect is there that no catalogue entry explains; a map stands in.{looks}{share}",
             "Look at the map's shape; record a second run with another amplitude.",
         )
     more = "measure the velocity beside the displacement" if imposed else "measure the missing channels"

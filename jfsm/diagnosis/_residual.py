@@ -23,12 +23,13 @@ _NEIGHBOURS = 160
 
 @dataclass(frozen=True)
 class Residual:
-    """Missing force of one link against its motion."""
+    """Missing force of one link against its motion, with the standard deviation of its noise."""
 
     at: tuple[int, int]
     displacement: np.ndarray
     velocity: np.ndarray
     force: np.ndarray
+    std: np.ndarray
     force_map: RKPM | None
 
 
@@ -42,7 +43,8 @@ def residual(structure: Structure, nuisances: Nuisances, until: int, at: tuple[i
     links = list(structure.links)
     rows = np.array([direction(link, structure.dof) for link in links])
     # Forces on degrees of freedom as forces on links: exact for a chain, least squares otherwise.
-    forces = np.linalg.lstsq(rows.T, found.force.T, rcond=None)[0]
+    shared = np.linalg.pinv(rows.T)
+    forces, std = shared @ found.force.T, np.sqrt(shared**2 @ found.std.T**2)
     link = int(np.argmax(np.std(forces, axis=1))) if at is None else links.index(at)
     d, w, f = found.displacement @ rows[link], found.velocity @ rows[link], forces[link]
     count = min(until, n)
@@ -53,7 +55,7 @@ def residual(structure: Structure, nuisances: Nuisances, until: int, at: tuple[i
         )
     except (ValueError, RuntimeError):  # one orbit only, or too few points: there is no surface to draw
         force_map = None
-    return Residual(links[link], d, w, f, force_map)
+    return Residual(links[link], d, w, f, std[link], force_map)
 
 
 def stand_in(trial: Trial, records: list[Nuisances], until: list[int]) -> Trial | None:
