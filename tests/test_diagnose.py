@@ -103,7 +103,7 @@ def test_the_verdict_is_written_as_json_and_as_a_page(hidden_cubic, tmp_path):
     data = json.loads((tmp_path / "d.json").read_text())
     assert data["verdict"] == "cause"
     assert data["findings"][0]["parameters"]["k3"]["value"] == hidden_cubic.findings[0].parameters["k3"].value
-    assert set(data["curves"]) == {"holdout", "residual", "map", "law"}
+    assert set(data["curves"]) == {"holdout", "residual", "course", "map", "law"}
     assert data["curves"]["map"] is not None
     page = (tmp_path / "d.html").read_text()
     assert "cubic" in page

@@ -79,6 +79,16 @@ def curves(n: int = 900) -> dict[str, Any]:
             "force": force.tolist(),
             "unit": {"displacement": "m", "velocity": "m/s", "force": "N"},
         },
+        "course": {
+            "time": t.tolist(),
+            "force": force.tolist(),
+            "error": np.full(n, 0.06).tolist(),
+            "frequency": np.linspace(0.1, 10.0, 40).tolist(),
+            "density": (1.0 / np.linspace(0.1, 10.0, 40)).tolist(),
+            "lag": np.linspace(0.05, 4.0, 50).tolist(),
+            "correlation": (0.1 * np.cos(np.linspace(0.05, 20.0, 50))).tolist(),
+            "chance": 0.065,
+        },
         "map": {
             "displacement": grid_x.tolist(),
             "velocity": grid_v.tolist(),
@@ -407,13 +417,13 @@ def test_a_verdict_alone_makes_a_page(verdict):
     assert isinstance(plot_diagnosis({"verdict": verdict}), Figure)
 
 
-@pytest.mark.parametrize("absent", ["holdout", "residual", "map", "law"])
+@pytest.mark.parametrize("absent", ["holdout", "residual", "course", "map", "law"])
 def test_curves_that_are_absent_are_not_drawn(absent):
     d = diagnosis("cause")
     d["curves"][absent] = None
     drawn = {picture.name for picture in pictures(d)}
     picture = {"holdout": "record", "law": "law"}.get(absent, absent)
-    assert drawn == {"record", "residual", "map", "gain", "ranking"} - {picture}
+    assert drawn == {"record", "residual", "course", "map", "gain", "ranking"} - {picture}
 
 
 def nulled(value: Any) -> Any:
@@ -492,7 +502,7 @@ def test_drawing_needs_no_pyplot():
 
 def test_one_sheet_holds_all_pictures(tmp_path):
     figure = plot_diagnosis(diagnosis("cause"))
-    assert len(figure.subfigs) == 5
+    assert len(figure.subfigs) == 6
     figure.savefig(tmp_path / "sheet.png", dpi=40)
     assert (tmp_path / "sheet.png").stat().st_size > 5000
 

@@ -11,6 +11,7 @@ from ..identification import Nuisances
 from ..structures import PARAMETER_CAUSES, Cause, Clipping, Structure, causes
 from ._candidates import Candidate
 from ._clipped import finding
+from ._course import course
 from ._decide import NEGLIGIBLE, Decision
 from ._detectable import Unseen, detectable
 from ._diagnosis import CandidateResult, Diagnosis, Estimate, Finding, Rival
@@ -84,7 +85,11 @@ def assemble(
         "shape": None if shape is None else {**_plain(shape._asdict()), "words": shape.words},
         "notes": list(notes),
         "detectable": {c: {"parameter": p, "value": e.value, "unit": e.unit} for c, (p, e) in smallest.items()},
-        "curves": {"holdout": _holdout(runs), **curves(missing, units, decision.named_term)},
+        "curves": {
+            "holdout": _holdout(runs),
+            **curves(missing, units, decision.named_term),
+            "course": course(missing, float(records[0].record.time[0]), records[0].record.dt, records[0].period),
+        },
     }
     return Diagnosis(
         verdict=decision.verdict, findings=findings, candidates=candidates, extended=extended, refitted=refit,

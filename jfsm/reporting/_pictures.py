@@ -6,6 +6,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from jfsm.reporting._canvas import house_style
+from jfsm.reporting._course_picture import describe_course, draw_course
 from jfsm.reporting._curves import first_channels
 from jfsm.reporting._force_pictures import describe_map, describe_residual, draw_map, draw_residual
 from jfsm.reporting._record_picture import describe_record, draw_record
@@ -83,6 +84,17 @@ def _sketches(d: Mapping[str, Any]) -> Iterator[Sketch]:
             describe_residual(residual, law),
             3.9,
             lambda figure: draw_residual(figure, residual, law),
+        )
+    if course := curves.get("course"):
+        unit = ((residual or {}).get("unit") or {}).get("force")
+        yield Sketch(
+            "course",
+            "The residual force over time, frequency and past",
+            "The band is twice its standard error. What a map of displacement and velocity leaves is correlated with its "
+            "own past for a moment, as its error is, and on and on where the force follows time or what drives.",
+            describe_course(course, unit),
+            5.4,
+            lambda figure: draw_course(figure, course, unit),
         )
     if force_map := curves.get("map"):
         units = (residual or {}).get("unit") or {}

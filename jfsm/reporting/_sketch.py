@@ -29,7 +29,7 @@ class Picture:
     Attributes
     ----------
     name : str
-        Its id on a page: of a diagnosis "record", "residual", "map", "gain" or "ranking".
+        Its id on a page: of a diagnosis "record", "residual", "course", "map", "gain" or "ranking".
     title, caption : str
     alt : str
         The picture in words, numbers included.
