@@ -90,8 +90,8 @@ def _sketches(d: Mapping[str, Any]) -> Iterator[Sketch]:
         yield Sketch(
             "course",
             "The residual force over time, frequency and past",
-            "The band is twice its standard error. What a map of displacement and velocity leaves is correlated with its "
-            "own past for a moment, as its error is, and on and on where the force follows time or what drives.",
+            "The band is twice its standard error. What a map of displacement and velocity leaves is correlated with "
+            "its own past for a moment, as its error is, and on and on where the force follows time or what drives.",
             describe_course(course, unit),
             5.4,
             lambda figure: draw_course(figure, course, unit),
