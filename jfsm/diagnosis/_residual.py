@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -84,9 +85,28 @@ def table_of(found: Residual) -> HermiteTable | None:
     return None if found.force_map is None else tabulate(found.force_map)
 
 
+def agreement(found: Residual, term: AbstractTerm | None) -> float | None:
+    """Share of readings at which a law of displacement and velocity lies within twice their error of the map.
+
+    Constants and straight lines do not count, as offsets and own values take them. None where there is no such law, or
+    no map.
+    """
+    if found.force_map is None or term is None or term.states or term.delay is not None or term.timed:
+        return None
+    take = evenly_taken(found.force.size, _NODES)
+    d, w = found.displacement[take], found.velocity[take]
+    zero = jnp.zeros(())
+    law = jax.vmap(lambda d, w: term.force(d, w, (), zero))(jnp.asarray(d), jnp.asarray(w))
+    apart = np.asarray(law) - np.asarray(found.force_map.evaluate(np.column_stack([d, w])))
+    lines = np.column_stack([np.ones_like(d), d, w])
+    apart -= lines @ np.linalg.lstsq(lines, apart, rcond=None)[0]
+    return float(np.mean(np.abs(apart) <= 2 * found.std[take]))
+
+
 def curves(found: Residual, units, term: AbstractTerm | None) -> dict[str, Any]:
     """Points, map and law for the report, as plain lists."""
     points = shown_points(found.at, found.displacement, found.velocity, found.force, units)
+    points["agreement"] = agreement(found, term)
     x = np.linspace(found.displacement.min(), found.displacement.max(), GRID)
     v = np.linspace(found.velocity.min(), found.velocity.max(), GRID)
     drawn: dict[str, Any] = {"residual": points, "map": None, "law": None}

@@ -9,6 +9,7 @@ from jfsm.reporting._canvas import house_style
 from jfsm.reporting._course_picture import describe_course, draw_course
 from jfsm.reporting._curves import first_channels
 from jfsm.reporting._force_pictures import describe_map, describe_residual, draw_map, draw_residual
+from jfsm.reporting._quantities import percent
 from jfsm.reporting._record_picture import describe_record, draw_record
 from jfsm.reporting._score_pictures import describe_gain, describe_ranking, draw_gain, draw_ranking, ranked_size
 from jfsm.reporting._sketch import WIDTH, Picture, Sketch, drawn
@@ -61,6 +62,11 @@ def _what_runs(holdout: Mapping[str, Any]) -> str:
     return "The force that the imposed motion needs," if forces else "Free runs"
 
 
+def _agreement(residual: Mapping[str, Any]) -> str:
+    share = residual.get("agreement")
+    return "" if share is None else f" The law lies within twice the map's error at {percent(share)} of the readings."
+
+
 def _sketches(d: Mapping[str, Any]) -> Iterator[Sketch]:
     checked_verdict(d)
     curves = d.get("curves") or {}
@@ -80,7 +86,7 @@ def _sketches(d: Mapping[str, Any]) -> Iterator[Sketch]:
             "residual",
             "The residual force",
             "What the simulation leaves over, estimated without assuming a law. The stronger points, where the other "
-            "coordinate is near zero, are those to compare with a law's line.",
+            "coordinate is near zero, are those to compare with a law's line." + _agreement(residual),
             describe_residual(residual, law),
             3.9,
             lambda figure: draw_residual(figure, residual, law),
