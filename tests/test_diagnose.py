@@ -77,6 +77,7 @@ def test_the_extended_model_closes_what_can_be_closed_on_held_out_readings(hidde
     gain = hidden_cubic.gain
     assert gain.closed > 0.95
     assert gain.after < gain.refitted < gain.before
+    assert 0.95 < gain.interval[0] <= gain.closed <= gain.interval[1] <= 1 and gain.significant
     assert hidden_cubic.extended.values()["cubic_stiffness@0-1.k3"] == pytest.approx(CUBIC, rel=0.03)
 
 
@@ -141,7 +142,7 @@ def test_what_shows_only_in_the_part_that_was_kept_back_is_named_from_there():
 
 
 def test_a_cause_that_makes_held_out_runs_worse_is_not_named(believed, monkeypatch):
-    worse = Gain(before=0.1, refitted=0.1, after=0.2, floor=0.01, channels={})
+    worse = Gain(before=0.1, refitted=0.1, after=0.2, floor=0.01, channels={}, interval=(-2.0, -0.5))
     monkeypatch.setattr("jfsm.diagnosis._diagnose.measure_gain", lambda *arguments: (worse, []))
     d = jfsm.diagnose(made(duffing), believed, causes=FEW, key=jax.random.key(0))
     assert d.verdict == "undecided"
@@ -149,6 +150,14 @@ def test_a_cause_that_makes_held_out_runs_worse_is_not_named(believed, monkeypat
     assert "cubic_stiffness@0-1.k3" not in d.extended.values()
     refused = next(c for c in d.candidates if c.cause == "cubic_hardening")
     assert refused.why == "runs worse on held-out readings than the model as given"
+
+
+def test_a_cause_that_gains_no_more_than_chance_comes_with_the_advice_to_leave_the_model(believed, monkeypatch):
+    hardly = Gain(before=0.1, refitted=0.1, after=0.099, floor=0.01, channels={}, interval=(-0.1, 0.2))
+    monkeypatch.setattr("jfsm.diagnosis._diagnose.measure_gain", lambda *arguments: (hardly, []))
+    d = jfsm.diagnose(made(duffing), believed, causes=FEW, key=jax.random.key(0))
+    assert d.verdict == "cause"
+    assert "Do not change the model" in d.advice and d.data["gain"]["significant"] is False
 
 
 def test_the_same_key_gives_the_same_answer(hidden_cubic, believed):

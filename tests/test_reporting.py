@@ -227,7 +227,7 @@ def diagnosis(verdict: str) -> dict[str, Any]:
             "stiffness@0-1.k": {"given": 900.0, **estimate(903.1, "N/m", 0.003)},
             "damping@0-1.c": {"given": 1.2, **estimate(1.21, "N s/m", 0.04)},
         },
-        "gain": {"closed": closed, "channels": channels},
+        "gain": {"closed": closed, "interval": closed and [closed - 0.07, closed + 0.01], "channels": channels},
         "notes": ["Steps of time differ by 1.2 %; they are treated as uniform."],
         "detectable": {
             "coulomb": {"parameter": "F", "value": 0.031, "unit": "N"},
@@ -373,6 +373,12 @@ def test_the_first_screen_of_a_cause_names_it_with_its_probability_value_and_gai
     first_screen = page.text[: page.text.index("Does it predict what it has not seen?")]
     for words in ("Cubic hardening", "96 %", "k3 = 402.0 kN/m³", "displacement 1: 6.83 → 0.298 mm"):
         assert words in first_screen.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def test_the_gain_is_shown_with_its_interval():
+    text = diagnosis_text(diagnosis("cause")).replace("\N{NO-BREAK SPACE}", " ")
+    closed = diagnosis("cause")["gain"]["closed"]
+    assert f"95 % interval {100 * closed - 7:.0f} % to" in text
 
 
 def test_every_picture_says_in_words_what_it_shows():

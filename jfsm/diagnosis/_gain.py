@@ -21,6 +21,9 @@ _CLOSABLE = 1.05
 """Error before, in floors, from which there is anything to close."""
 _DRAWS = 4
 """Draws of noise that show what it leaves of a perfect model's run."""
+_FEWEST, _MOST_BLOCKS = 5, 20
+"""Blocks of held-out readings, two periods long where there are enough, that are drawn anew for an interval."""
+_RESAMPLED = 1000
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,13 @@ class Gain:
     after: float
     floor: float
     channels: dict[str, ChannelGain]
+    interval: tuple[float, float]
+    """95 % interval of `closed`, from blocks of the held-out readings drawn anew."""
+
+    @property
+    def significant(self) -> bool:
+        """Whether the extended model predicts better by more than chance."""
+        return self.interval[0] > 0
 
     @property
     def closed(self) -> float:
@@ -91,6 +101,7 @@ def measure_gain(
         name: {} for name in ("before", "refitted", "after", "floor", "spread")
     }
     curves = []
+    pieces: list[np.ndarray] = []
     for record, begin in ((part.record, part.begin) for part in held):
         window = window_for(record, omega)
         counted = _counted(record, max(window, begin))
@@ -99,6 +110,7 @@ def measure_gain(
             for name, model in (("before", given), ("refitted", refitted), ("after", extended))
         }
         left = _noise(extended, record, window, counted, reconstruction, runs["after"], noise, seed)
+        pieces += _blocks(record, [runs["before"], runs["after"]], counted, 2 * math.pi / (omega * record.dt))
         for channel, y in record.answers.items():
             for name, run in runs.items():
                 squares[name].setdefault(channel, []).append(float(np.mean((run[channel][counted] - y[counted]) ** 2)))
@@ -117,7 +129,29 @@ def measure_gain(
         name: math.sqrt(float(np.mean([(getattr(c, name) / c.spread) ** 2 for c in channels.values()])))
         for name in ("before", "refitted", "after", "floor")
     }
-    return Gain(**total, channels=channels), curves
+    spread = np.array([c.spread for c in channels.values()])
+    interval = _interval(np.mean(np.stack(pieces) / spread**2, -1), total["floor"], seed)
+    return Gain(**total, channels=channels, interval=interval), curves
+
+
+def _blocks(record: Record, runs: Sequence[Mapping[tuple, np.ndarray]], counted: slice, period: float) -> list:
+    """Mean square errors (runs, channels) of contiguous blocks of the readings that are counted."""
+    errors = np.stack([[(run[c] - y)[counted] ** 2 for c, y in record.answers.items()] for run in runs])
+    count = int(np.clip(errors.shape[-1] / (_PERIODS * period), _FEWEST, _MOST_BLOCKS))
+    return [block.mean(-1) for block in np.array_split(errors, min(count, errors.shape[-1]), axis=-1)]
+
+
+def _interval(blocks: np.ndarray, floor: float, rng: np.random.Generator) -> tuple[float, float]:
+    """95 % interval of the share closed, from mean square errors (blocks, 2) before and after.
+
+    References
+    ----------
+    B. Efron, R. J. Tibshirani, An Introduction to the Bootstrap, 1993, ch. 13 (percentile interval).
+    """
+    drawn = blocks[rng.integers(len(blocks), size=(_RESAMPLED, len(blocks)))]
+    closed = [_closed(before, after, floor) for before, after in np.sqrt(drawn.mean(1))]
+    low, high = np.quantile(closed, [0.025, 0.975])
+    return float(low), float(high)
 
 
 def _run(model: Structure, record: Record, window: int, reconstruction: Reconstruction) -> dict[tuple, np.ndarray]:

@@ -25,6 +25,7 @@ from ._trial import Trial
 
 _SHOWN = 2000
 """Points of a curve in the report."""
+_NO_GAIN = "Do not change the model for the sake of its predictions: on held-out readings it gains no more than chance."
 
 
 class Tested(NamedTuple):
@@ -231,15 +232,17 @@ def _words(
         if gain is None
         else f" The {error} on held-out readings goes from {gain.before:.2%} to {gain.after:.2%} of the signal."
     )
+    pays = gain is None or gain.significant
     if decision.verdict == "consistent":
         return "The record shows nothing beyond noise that the model lacks.", "Keep the model as it is."
     if decision.verdict == "parameters":
         what = "; ".join(f.sentence for f in findings) or "its own values moved together"
-        return f"The form of the model is right, its values are off: {what}.{share}", "Use the refitted values."
+        use = "Use the refitted values." if pays else _NO_GAIN
+        return f"The form of the model is right, its values are off: {what}.{share}", use
     if decision.verdict == "cause":
         known = dict(causes()) | {e.cause.id: e.cause for e in decision.winner.effects}
         said = " ".join(_said(f, known) for f in findings)
-        return f"{said}{_remainder(decision.winner)}{share}", "Use the extended model."
+        return f"{said}{_remainder(decision.winner)}{share}", "Use the extended model." if pays else _NO_GAIN
     if decision.verdict == "unnamed":
         looks = "" if shape is None else f" {shape.words}"
         return (
@@ -297,6 +300,8 @@ def _gain(gain: Gain) -> dict[str, Any]:
         channels[name] = row
     return {
         "closed": gain.closed,
+        "interval": list(gain.interval),
+        "significant": gain.significant,
         "before": gain.before,
         "refitted": gain.refitted,
         "after": gain.after,

@@ -89,4 +89,7 @@ def _gain(d: Dictionary) -> Answer:
         lines.append(f"{name}: {figures} {scale.unit}".rstrip())
     if d["verdict"] == "consistent" or gain.get("closed") is None:
         return Answer("Gain", "Nothing to close" if d["verdict"] == "consistent" else "None claimed", tuple(lines))
+    if gain.get("interval"):
+        low, high = gain["interval"]
+        lines.insert(0, f"95 % interval {percent(low)} to {percent(high)}")
     return Answer("Gain", f"{percent(gain['closed'])} closed", tuple(lines), min(max(gain["closed"], 0.0), 1.0))
