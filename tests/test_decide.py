@@ -168,6 +168,17 @@ def test_where_none_is_right_no_law_of_time_leads(forgiven: bool, named: str):
     assert decision.verdict == "cause" and decision.winner.effects[0].cause.id == named
 
 
+@pytest.mark.parametrize(
+    ("one_decay", "cause", "verdict"),
+    [(False, "stiffness_drop", "cause"), (True, "stiffness_drop", "undecided"), (True, "coulomb", "cause")],
+)
+def test_a_single_decay_tells_no_change_with_time_from_one_with_amplitude(one_decay: bool, cause: str, verdict: str):
+    found = trial(9000.0, 0.0, cause)
+    decision = decide(GIVEN, REFITTED, [found], lambda t: None, lambda t: 0.0, periods=100.0, one_decay=one_decay)
+    assert decision.verdict == verdict
+    assert ("single decay" in decision.why[id(found)]) == (verdict == "undecided")
+
+
 @pytest.mark.parametrize(("forgiven", "verdict"), [(False, "unnamed"), (True, "cause")])
 def test_where_none_is_right_a_map_of_the_rest_does_not_speak_against_a_law_that_explains_nearly_all(forgiven, verdict):
     found = trial(9000.0, 0.004, "coulomb")

@@ -42,6 +42,7 @@ law, and two together stand for many a single one."""
 _UNFIT_OF_WHITE = 0.005
 """The same where innovations are white: all else is right then."""
 _NOT_RIGHT = "explains much of it, but is not of the right shape"
+_ONE_DECAY = "changes with time, which a single decay does not tell from a change with amplitude"
 _ALIKE = 0.3
 """Probability of another law of its family, in those of a law that is not of the right shape, that may take its place.
 """
@@ -155,6 +156,7 @@ def decide(
     *,
     imposed: bool = False,
     forgiven: bool = False,
+    one_decay: bool = False,
 ) -> Decision:
     """Verdict over the model as given, the model refitted, every candidate, and a map that stands for any law.
 
@@ -162,7 +164,8 @@ def decide(
     `lack_of_fit` tells what other laws would explain beside a trial's; it is asked of a cause that would be named.
     Where some force is `forgiven` to all none of them is right: laws of time would explain whatever is left, and a map
     of the little that a law leaves does not speak against it. Along an `imposed` motion a map repeats even the small
-    faults of a law, one by one, as often as it repeats itself.
+    faults of a law, one by one, as often as it repeats itself. In `one_decay` a spring or damper that changes with time
+    may be one that changes with the amplitude: it is a rival, and no finding.
     """
     kappa, why = {}, {}
     passing = []
@@ -203,8 +206,9 @@ def decide(
         for t in passing:
             if families(t) == families(winner):
                 chance[id(t)] *= 1.0 - 0.5 * min(doubt, 1.0)
-        if doubt > 1.0:
-            why[id(winner)], chance[id(winner)] = _NOT_RIGHT, 0.0
+        ages = one_decay and "time" in families(winner)
+        if doubt > 1.0 or ages:
+            why[id(winner)], chance[id(winner)] = _ONE_DECAY if ages else _NOT_RIGHT, 0.0
             mapped = stand_in(refitted)
             stands_in = mapped is not None and explained(mapped, refitted) >= GATE
             verdict, winner = ("unnamed", refitted) if stands_in else ("undecided", winner)

@@ -126,7 +126,8 @@ def diagnose(
     steps.next("the verdict")
     periods = sum(n.record.duration / n.period for n in records)
     mapped = partial(stand_in, records=records, until=until)
-    decision = decide(given, refitted, trials, mapped, lack, periods, imposed=imposed)
+    one_decay = len(records) == 1 and not imposed and not records[0].driven
+    decision = decide(given, refitted, trials, mapped, lack, periods, imposed=imposed, one_decay=one_decay)
     again = None if decision.winner.effects else forgiving([given, refitted, *trials], records, until)
     if again is not None:
         best, before = min(t.rung for t in trials), trials
