@@ -15,6 +15,7 @@ import json
 import multiprocessing
 import os
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -146,6 +147,9 @@ def earlier_rows(path: Path, drawing: Drawing) -> list[Row]:
 def answers(seeds: Sequence[int], drawing: Drawing, jobs: int) -> Iterator[Row]:
     """Rows of these seeds as they are done, from `jobs` processes of one core each."""
     os.environ.update(ONE_CORE)  # spawned processes inherit it
+    # What one of them has compiled, the others and later calls need not compile again.
+    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(Path(tempfile.gettempdir()) / "jfsm-blind-programs"))
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.2")
     context = multiprocessing.get_context("spawn")
     pool = concurrent.futures.ProcessPoolExecutor(jobs, mp_context=context)
     try:

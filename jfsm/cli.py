@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from platformdirs import user_cache_path
 
 if TYPE_CHECKING:
     import jax
@@ -29,6 +30,9 @@ FOUND, BAD_INPUT, NOT_FINISHED = 1, 2, 3
 
 _PACE = 600.0
 """Seconds over which the time left is judged: one step of a diagnosis may compile for half a minute."""
+
+_WORTH_KEEPING = "0.2"
+"""Seconds of compilation from which a program is kept for the next call."""
 
 app = typer.Typer(
     help="What a simulation gets wrong against a measured record, the name of the cause, and the gain of mending it.",
@@ -59,7 +63,7 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(function)
     def run(**options: Any) -> None:
         try:
-            _use_doubles()
+            _settle_jax()
             function(**options)
         except BrokenPipeError:  # whoever read the output has seen enough; typer ends such a process in silence
             raise
@@ -75,12 +79,18 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
     return app.command()(run)
 
 
-def _use_doubles() -> None:
-    """Double precision from here on, without loading JAX for a command that needs none."""
+def _settle_jax() -> None:
+    """Double precision from here on, and compiled programs kept for the next call; JAX itself is loaded where needed.
+
+    `JAX_COMPILATION_CACHE_DIR` says where they are kept, `JAX_ENABLE_COMPILATION_CACHE=0` that they are not.
+    """
     if "jax" in sys.modules:
         sys.modules["jax"].config.update("jax_enable_x64", True)
-    else:
-        os.environ["JAX_ENABLE_X64"] = "1"  # read when it is loaded
+        return
+    # Read when it is loaded.
+    os.environ["JAX_ENABLE_X64"] = "1"
+    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(user_cache_path("jfsm")))
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", _WORTH_KEEPING)
 
 
 @dataclass(frozen=True)

@@ -343,3 +343,11 @@ def test_a_buckled_spring_that_leaves_one_well_is_another_law():
     law = jfsm.causes()["double_well"].effect
     assert "one well" in law(8.0, 1.0, at=(0, 1)).otherwise(9.0)
     assert law(10.0, 1.0, at=(0, 1)).otherwise(9.0) == ""
+
+
+@pytest.mark.parametrize("cause", ["stribeck", "lugre"])
+def test_friction_that_is_gone_at_speed_is_another_law(cause):
+    numbers = {p.name: 1.0 for p in jfsm.causes()[cause].effect.parameters}
+    for share, gone in ((0.1, True), (0.4, False)):
+        law = jfsm.causes()[cause].term(at=(0, 1), **(numbers | {"F": share}))
+        assert ("all but gone" in law.otherwise(9.0)) == gone

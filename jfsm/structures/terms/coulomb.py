@@ -9,6 +9,8 @@ from .._term import ABOVE_ZERO, AbstractFriction, Parameter, Scalar, as_link
 FORCE = Parameter("F", force=1, meaning="friction force", least=0.0)
 SPEED = Parameter("v_s", length=1, time=-1, meaning="Stribeck speed", least=ABOVE_ZERO)
 STATIC = Parameter("F_static", force=1, meaning="friction force at rest", least=0.0)
+_FADES = 0.2
+"""Friction at speed, as a share of that at rest, below which the friction is gone rather than less."""
 
 
 class Coulomb(AbstractFriction):
@@ -50,6 +52,11 @@ def stribeck_force(F, F_static, v_s, w):
     return F + (F_static - F) * jnp.exp(-((w / v_s) ** 2))
 
 
+def gone_at_speed(F, F_static) -> str:
+    """Why friction with these levels is none; empty if it is."""
+    return "at speed its friction is all but gone" if F < _FADES * F_static else ""
+
+
 class Stribeck(AbstractFriction):
     """Friction that falls with speed: sgn w·(F + (F_static - F)·exp(-(w/v_s)²)), within ±F_static while it sticks."""
 
@@ -63,6 +70,9 @@ class Stribeck(AbstractFriction):
     def limits(self, d, w, z, t):
         size = stribeck_force(self.F, self.F_static, self.v_s, w)
         return -size, size
+
+    def otherwise(self, stiffness):
+        return gone_at_speed(self.F, self.F_static)
 
     @classmethod
     def shapes(cls, scale):

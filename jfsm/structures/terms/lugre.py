@@ -5,7 +5,7 @@ import jax.numpy as jnp
 
 from ..._types import as_scalar
 from .._term import ABOVE_ZERO, AbstractTerm, Parameter, Scalar, as_link
-from .coulomb import FORCE, SPEED, STATIC, stribeck_force
+from .coulomb import FORCE, SPEED, STATIC, gone_at_speed, stribeck_force
 
 
 class LuGre(AbstractTerm):
@@ -43,6 +43,9 @@ class LuGre(AbstractTerm):
 
     def state_rate(self, d, w, z, t):
         return jnp.stack([self._bend_rate(w, z[0])])
+
+    def otherwise(self, stiffness):
+        return gone_at_speed(self.F, self.F_static)
 
     @classmethod
     def shapes(cls, scale):
