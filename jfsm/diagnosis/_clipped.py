@@ -7,6 +7,7 @@ import numpy as np
 
 from ..records import Record, clipped
 from ..structures import Clipping, Structure, causes
+from ._class import class_of
 from ._decide import Decision
 from ._diagnosis import Estimate, Finding
 from ._trial import Trial
@@ -52,4 +53,6 @@ def finding(sensor: Clipping, unit: str) -> Finding:
     """A clipped channel as a finding."""
     limit, cause = sensor.value, causes()["clipping"]
     estimate = Estimate(limit, limit * (1 - _SAME), limit * (1 + _SAME), unit)
-    return Finding(cause.id, cause.family, sensor.at, PROBABILITY, {"limit": estimate}, (), cause.sentence)
+    values = {"limit": estimate}
+    kind = class_of(cause, sensor)
+    return Finding(cause.id, cause.family, sensor.at, PROBABILITY, values, (), cause.sentence, kind, PROBABILITY)

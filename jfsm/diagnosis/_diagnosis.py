@@ -24,7 +24,11 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Finding:
-    """One named cause, or one own value that is wrong."""
+    """One named cause, or one own value that is wrong.
+
+    `kind` is the class of the cause in words, and `kind_probability` that of the class: of the cause and of those of
+    its rivals that belong there.
+    """
 
     cause: str
     family: str
@@ -33,6 +37,8 @@ class Finding:
     parameters: dict[str, Estimate]
     rivals: tuple["Rival", ...] = ()
     sentence: str = ""
+    kind: str = ""
+    kind_probability: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 from ..identification import Nuisances
 from ..structures import PARAMETER_CAUSES, Cause, Clipping, Structure, causes
 from ._candidates import Candidate
+from ._class import class_of
 from ._clipped import finding
 from ._course import course
 from ._decide import NEGLIGIBLE, Decision
@@ -25,6 +26,8 @@ from ._trial import Trial
 
 _SHOWN = 2000
 """Points of a curve in the report."""
+_SURE = 0.9
+"""Probability of a cause from which its name is not open."""
 _NO_GAIN = "Do not change the model for the sake of its predictions: on held-out readings it gains no more than chance."
 
 
@@ -54,7 +57,7 @@ def assemble(
     """The diagnosis, with everything that the report needs."""
     trials = tested.trials
     units = records[0].record.units
-    findings = _findings(decision, trials, model, units)
+    findings = _findings(decision, trials, model, records[0])
     if decision.verdict == "cause":
         findings += tuple(finding(sensor, units[sensor.at[0]]) for sensor in clipped)
     candidates = (
@@ -145,21 +148,26 @@ def _all_values(t: Trial, model: Structure, units) -> dict[str, Estimate]:
     return {f"{cause}.{name}": estimate for cause, values in named for name, estimate in values.items()}
 
 
-def _findings(decision: Decision, trials: list[Trial], model: Structure, units) -> tuple[Finding, ...]:
-    winner = decision.winner
+def _findings(decision: Decision, trials: list[Trial], model: Structure, nuisances: Nuisances) -> tuple[Finding, ...]:
+    winner, units = decision.winner, nuisances.record.units
     if decision.verdict == "cause" and winner.effects:
-        found = [_finding(which, decision, trials, model, units) for which in range(len(winner.effects))]
+        found = [_finding(which, decision, trials, model, nuisances) for which in range(len(winner.effects))]
         return tuple(sorted(found, key=lambda f: -f.probability))
     if decision.verdict == "parameters":
         return _wrong_values(winner, decision.share(winner), model, units)
     return ()
 
 
-def _finding(which: int, decision: Decision, trials: list[Trial], model: Structure, units) -> Finding:
+def _finding(which: int, decision: Decision, trials: list[Trial], model: Structure, nuisances: Nuisances) -> Finding:
     """One effect of the winner; its rivals are what it may be instead, the winner's other effects aside."""
     winner = decision.winner
     effect = winner.effects[which]
-    probability, instead = 0.0, dict[Effect, float]()
+    peak = nuisances.crest * nuisances.length
+
+    def kind_of(t: Trial, which: int) -> str:
+        return class_of(t.effects[which].cause, t.parts[which], peak, peak * nuisances.omega)
+
+    kind, probability, alike, instead = kind_of(winner, which), 0.0, 0.0, dict[Effect, float]()
     for t in trials:
         rest = set(t.effects) - set(winner.effects)
         if effect in t.effects:
@@ -167,10 +175,14 @@ def _finding(which: int, decision: Decision, trials: list[Trial], model: Structu
         elif len(rest) == 1:
             rival = rest.pop()
             instead[rival] = instead.get(rival, 0.0) + decision.share(t)
+            if decision.share(t) > 0 and rival.at == effect.at and kind_of(t, t.effects.index(rival)) == kind:
+                alike += decision.share(t)
     ranked = sorted(instead.items(), key=lambda item: -item[1])
     rivals = tuple(Rival(r.cause.id, r.at, share) for r, share in ranked if share > RIVAL)
-    cause, values = effect.cause, _values(winner, which, model, units)
-    return Finding(cause.id, cause.family, effect.at, probability, values, rivals, cause.sentence)
+    cause, values = effect.cause, _values(winner, which, model, nuisances.record.units)
+    return Finding(
+        cause.id, cause.family, effect.at, probability, values, rivals, cause.sentence, kind, probability + alike
+    )
 
 
 def _wrong_values(t: Trial, probability: float, model: Structure, units) -> tuple[Finding, ...]:
@@ -196,6 +208,8 @@ def _wrong_values(t: Trial, probability: float, model: Structure, units) -> tupl
                         {name: _estimate(t, u.path, model, units)},
                         (),
                         sentence,
+                        "a wrong value",
+                        probability,
                     ),
                 )
             )
@@ -265,9 +279,14 @@ def _remainder(winner: Trial) -> str:
 
 
 def _said(finding: Finding, known: Mapping[str, Cause]) -> str:
-    """A finding as a sentence, or two where its name is open."""
+    """A finding as a sentence; where its name is open, its class comes first, and then the names that it may have."""
     cause, where = known[finding.cause], "-".join(map(str, finding.at))
     lacks = "The record shows" if cause.is_sensor else "The model lacks"
+    if finding.probability < _SURE and finding.kind_probability - finding.probability > RIVAL:
+        names = [(cause.label, finding.probability)]
+        names += [(known[r.cause].label, r.probability) for r in finding.rivals if r.cause in known]
+        listed = ", ".join(f"{name} ({chance:.0%})" for name, chance in names)
+        return f"{lacks} {finding.kind} at {where} ({finding.kind_probability:.0%}); its law is open: {listed}."
     said = f"{lacks} {cause.label} at {where}: {finding.sentence}."
     if finding.probability >= 0.5 or not finding.rivals:
         return said

@@ -67,23 +67,25 @@ def shape_of(found: Residual) -> Shape | None:
     numbers = np.linalg.lstsq(columns, mapped, rcond=None)[0]
     rest = float(np.var(mapped - columns @ numbers))
     sizes = np.split(numbers[1:], 2)
-    bent = [_bent(axis, part, size) for axis, part, size in zip((u, z), along, sizes, strict=True)]
-    power = [float(np.var(odd + even)) for odd, even in bent]
+    curves = [
+        bent(axis, part[:, ::2] @ size[::2], part[:, 1::2] @ size[1::2])
+        for axis, part, size in zip((u, z), along, sizes, strict=True)
+    ]
+    power = [float(np.var(odd + even)) for odd, even in curves]
     total = max(sum(power) + rest, np.finfo(float).tiny)
     leading = int(np.argmax(power))
-    odd, even = bent[leading]
+    odd, even = curves[leading]
     share = float(np.var(odd) / max(np.var(odd) + np.var(even), np.finfo(float).tiny))
-    growth = _growth((u, z)[leading], odd) if share > _MUCH else 0
-    return Shape(1.0 - left / there, power[0] / total, power[1] / total, rest / total, share, growth)
+    grows = growth((u, z)[leading], odd) if share > _MUCH else 0
+    return Shape(1.0 - left / there, power[0] / total, power[1] / total, rest / total, share, grows)
 
 
-def _bent(axis: np.ndarray, columns: np.ndarray, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Odd and even part of a curve at its readings, the odd one without its straight line."""
-    odd, even = columns[:, ::2] @ numbers[::2], columns[:, 1::2] @ numbers[1::2]
+def bent(axis: np.ndarray, odd: np.ndarray, even: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Odd and even part of a curve without its straight line and its constant."""
     return odd - axis * (axis @ odd) / (axis @ axis), even - np.mean(even)
 
 
-def _growth(axis: np.ndarray, odd: np.ndarray) -> int:
+def growth(axis: np.ndarray, odd: np.ndarray) -> int:
     """Sign of the cube in an odd curve without its straight line, where it holds a share of it."""
     cube = axis**3 - axis * (axis @ axis**3) / (axis @ axis)
     held = float(cube @ odd) / max(np.linalg.norm(cube) * np.linalg.norm(odd), np.finfo(float).tiny)

@@ -50,7 +50,8 @@ def _certainty(d: Dictionary, findings: Sequence[Dictionary]) -> Answer:
     if findings:
         chances = [finding["probability"] for finding in findings if finding.get("probability") is not None]
         rivals = [rival for finding in findings for rival in finding.get("rivals") or ()]
-        details = _alternatives(rivals) or ("no rival explains the record",)
+        classes = [f"{probability(f['kind_probability'])} {f['kind']}" for f in findings if rivals and f.get("kind")]
+        details = (*classes, *_alternatives(rivals)) or ("no rival explains the record",)
         return Answer("How sure", " · ".join(map(probability, chances)) or "–", details, min(chances, default=None))
     tried = d.get("candidates") or ()
     ranked = sorted(tried, key=lambda candidate: candidate.get("probability") or 0.0, reverse=True)

@@ -1,0 +1,91 @@
+"""The class of a law: what narrow-band motion tells of it."""
+
+import pytest
+
+import jfsm
+from jfsm.diagnosis._class import class_of
+from jfsm.diagnosis._diagnosis import Finding, Rival
+from jfsm.diagnosis._report import _said
+
+PEAK, SPEED = 2.0, 3.0
+LAWS = {
+    "hardening stiffness": [
+        ("cubic_hardening", {"k3": 2.0}),
+        ("quintic_stiffness", {"k5": 0.1}),
+        ("square_stiffness", {"k2": 1.0}),
+        ("end_stop", {"k": 5.0, "gap": 1.2}),
+        ("dead_zone", {"k": 5.0, "gap": 0.4}),
+        ("double_well", {"k_neg": 3.0, "k3": 2.0}),
+        ("sine_stiffness", {"k": -1.0, "s": 0.5}),
+    ],
+    "softening stiffness": [
+        ("cubic_softening", {"k3": -0.1}),
+        ("square_stiffness", {"k2": -1.0}),
+        ("saturation", {"k": 5.0, "gap": 1.2}),
+        ("sine_stiffness", {"k": 1.0, "s": 0.5}),
+    ],
+    "asymmetric stiffness": [
+        ("quadratic_stiffness", {"k2": -1.0}),
+        ("bilinear_stiffness", {"k": 3.0, "knot": 0.2, "side": 1.0}),
+    ],
+    "friction": [
+        ("coulomb", {"F": 1.0}),
+        ("coulomb_asymmetric", {"F_plus": 1.0, "F_minus": 0.4}),
+        ("stribeck", {"F": 1.0, "F_static": 1.5, "v_s": 0.4}),
+        ("smooth_coulomb", {"F": 1.0, "v_s": 0.4}),
+        ("power_damping", {"c": 1.0, "n": 0.5}),
+    ],
+    "damping that grows with speed": [
+        ("quadratic_damping", {"c2": 1.0}),
+        ("cubic_damping", {"c3": 1.0}),
+        ("power_damping", {"c": 1.0, "n": 2.5}),
+    ],
+    "damping that changes with displacement": [
+        ("position_damping", {"c": 1.0}),
+        ("van_der_pol", {"eps": 1.0, "x0": 1.0}),
+    ],
+    "asymmetric damping": [("bilinear_damping", {"dc": 1.0, "side": -1.0})],
+    "a force with memory": [("maxwell", {"k": 1.0, "tau": 0.2})],
+    "a change with time": [("stiffness_drop", {"dk": 1.0, "t_star": 0.2})],
+    "an unmeasured force": [("preload", {"F": 1.0})],
+}
+
+
+@pytest.mark.parametrize(
+    ("kind", "cause", "numbers"), [(kind, *law) for kind, laws in LAWS.items() for law in laws], ids=lambda x: str(x)
+)
+def test_a_law_belongs_to_its_class_in_any_unit(kind: str, cause: str, numbers: dict[str, float]):
+    entry = jfsm.causes()[cause]
+    law = entry.term(at=(0, 1), **numbers)
+    assert class_of(entry, law, PEAK, SPEED) == kind
+    tiny = {p.name: numbers[p.name] * 1e-6 if p.force else numbers[p.name] for p in entry.effect.parameters}
+    assert class_of(entry, entry.term(at=(0, 1), **tiny), PEAK, SPEED) == kind
+
+
+def test_a_sensor_has_a_class_as_well():
+    entry = jfsm.causes()["accel_bias"]
+    assert class_of(entry, entry.term(at=("acceleration", 1), b=0.1)) == "a sensor's fault"
+
+
+@pytest.mark.parametrize(
+    ("probability", "kind_probability", "words"),
+    [
+        (0.55, 0.98, "hardening stiffness at 0-1 (98%); its law is open: a cubic hardening spring (55%), a pendulum's"),
+        (0.95, 0.98, "a cubic hardening spring at 0-1: grows."),
+        (0.45, 0.45, "a cubic hardening spring at 0-1: grows. By this record it may as well be a pendulum's spring."),
+    ],
+)
+def test_where_the_law_is_open_its_class_comes_first(probability: float, kind_probability: float, words: str):
+    rivals = (Rival("sine_stiffness", (0, 1), 0.04 if probability > 0.9 else 0.43),)
+    shown = Finding(
+        "cubic_hardening",
+        "stiffness",
+        (0, 1),
+        probability,
+        {},
+        rivals,
+        "grows",
+        "hardening stiffness",
+        kind_probability,
+    )
+    assert _said(shown, jfsm.causes()).startswith(f"The model lacks {words}")
