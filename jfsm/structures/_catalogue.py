@@ -76,7 +76,7 @@ class Cause(NamedTuple):
         """Whether it is a wrong value of the model's own, which a refit mends."""
         return self.family == "parameters"
 
-    def term(self, at: tuple[int, int], **parameters: float) -> Any:
+    def term(self, at: tuple, **parameters: float) -> Any:
         """The term (or sensor effect) with these numbers.
 
         Raises
