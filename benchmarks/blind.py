@@ -89,8 +89,13 @@ def question(challenge: Challenge) -> Row:
 
 def answer(diagnosis: Any) -> Row:
     """What a diagnosis says, as plain types."""
+    named = next((c for c in diagnosis.candidates if c.why == "named"), None)
+    gain = diagnosis.gain
     return {
         "verdict": diagnosis.verdict,
+        "named": named and {name: getattr(named, name) for name in ("kappa", "left", "whiteness", "unfit")},
+        "interval": gain and gain.interval,
+        "closable": gain and gain.before / gain.floor,
         "findings": [
             {
                 "cause": finding.cause,
@@ -107,7 +112,7 @@ def answer(diagnosis: Any) -> Row:
             }
             for finding in diagnosis.findings
         ],
-        "closed": None if diagnosis.gain is None else float(diagnosis.gain.closed),
+        "closed": None if gain is None else float(gain.closed),
         "error": None,
     }
 

@@ -9,6 +9,7 @@ import pytest
 import jfsm
 from jfsm.diagnosis._decide import decide, something_left
 from jfsm.diagnosis._effect import Effect
+from jfsm.diagnosis._lack_of_fit import Unfit
 from jfsm.diagnosis._trial import Prediction
 from jfsm.identification import Unknown
 
@@ -36,7 +37,7 @@ GIVEN, REFITTED = trial(0.0, 0.5), trial(1000.0, 0.1)
 
 
 def shares(*tried: Any) -> list[float]:
-    decision = decide(GIVEN, REFITTED, tried, lambda t: None, lambda t: 0.0, periods=100.0)
+    decision = decide(GIVEN, REFITTED, tried, lambda t: None, lambda t: Unfit(0.0), periods=100.0)
     assert decision.verdict == "cause" and decision.winner is tried[0]
     return [decision.share(t) for t in tried]
 
@@ -55,7 +56,7 @@ def test_a_cause_that_leaves_nothing_is_as_sure_as_its_evidence():
 def test_a_cause_is_the_less_sure_the_more_other_shapes_would_gain_beside_it():
     def share(nats: float) -> float:
         found = trial(9000.0, 0.002, "coulomb")
-        return decide(GIVEN, REFITTED, [found], lambda t: None, lambda t: nats, periods=100.0).share(found)
+        return decide(GIVEN, REFITTED, [found], lambda t: None, lambda t: Unfit(nats), periods=100.0).share(found)
 
     sure = share(15.0)  # what noise may gain
     assert sure > 0.95 and share(410.0) == pytest.approx(0.75 * sure, rel=1e-3) and share(801.0) == 0.0
@@ -65,7 +66,7 @@ def test_a_cause_is_the_less_sure_the_more_other_shapes_would_gain_beside_it():
 def test_no_cause_is_named_that_is_hardly_likelier_than_one_of_another_family_and_leaves_something(other, verdict):
     refitted = trial(1000.0, 0.04)
     tried = [trial(9000.0, 0.01, "coulomb"), trial(8990.0, 0.0105, other)]
-    decision = decide(GIVEN, refitted, tried, lambda t: None, lambda t: 0.0, periods=100.0)
+    decision = decide(GIVEN, refitted, tried, lambda t: None, lambda t: Unfit(0.0), periods=100.0)
     assert decision.verdict == verdict
     assert 0.4 < decision.share(tried[0]) < 0.55 and 0.2 < decision.share(tried[1]) < 0.4
 
@@ -82,10 +83,23 @@ def test_no_cause_is_named_that_is_hardly_likelier_than_one_of_another_family_an
 )
 def test_no_cause_is_named_beside_which_other_shapes_would_explain_much(nats: float, left: float, verdict: str):
     found = trial(9000.0, left, "coulomb")
-    decision = decide(GIVEN, REFITTED, [found], lambda t: None, lambda t: nats, periods=100.0)
+    decision = decide(GIVEN, REFITTED, [found], lambda t: None, lambda t: Unfit(nats), periods=100.0)
     assert decision.verdict == verdict
     if verdict == "undecided":
         assert decision.winner is REFITTED and decision.share(found) == 0 and "shape" in decision.why[id(found)]
+
+
+@pytest.mark.parametrize(("share", "verdict"), [(0.4, "cause"), (0.6, "undecided")])
+def test_no_cause_is_named_beside_which_other_shapes_explain_most_of_what_it_leaves(share: float, verdict: str):
+    found = trial(9000.0, 0.002, "coulomb")
+    decision = decide(GIVEN, REFITTED, [found], lambda t: None, lambda t: Unfit(100.0, share), periods=100.0)
+    assert decision.verdict == verdict
+
+
+@pytest.mark.parametrize(("nats", "verdict"), [(30.0, "consistent"), (50.0, "undecided")])
+def test_a_record_is_not_called_consistent_where_other_shapes_explain_more_than_noise(nats: float, verdict: str):
+    given, refitted = trial(0.0, 0.0), trial(-5.0, 0.0)
+    assert decide(given, refitted, [], lambda t: None, lambda t: Unfit(nats), periods=100.0).verdict == verdict
 
 
 @pytest.mark.parametrize(
@@ -103,7 +117,7 @@ def test_no_cause_is_named_beside_an_own_value_that_went_as_far_as_it_may(path, 
     found, refitted = trial(9000.0, 0.0, "coulomb"), trial(1000.0, 0.1)
     for t, value in ((found, theta), (refitted, refit)):
         t.unknowns, t.theta = (own,), np.array([value])
-    decision = decide(GIVEN, refitted, [found], lambda t: None, lambda t: 0.0, periods=100.0)
+    decision = decide(GIVEN, refitted, [found], lambda t: None, lambda t: Unfit(0.0), periods=100.0)
     assert decision.verdict == verdict
     assert (path in decision.why[id(found)]) == (verdict == "undecided")
 
@@ -111,7 +125,7 @@ def test_no_cause_is_named_beside_an_own_value_that_went_as_far_as_it_may(path, 
 @pytest.mark.parametrize(("nats", "verdict"), [(25.0, "cause"), (39.0, "cause"), (41.0, "undecided")])
 def test_of_a_small_effect_other_shapes_gain_more_than_a_share_before_noise_is_ruled_out(nats: float, verdict: str):
     found = trial(1200.0, 0.0, "coulomb")  # it gains 200 nats
-    decision = decide(GIVEN, REFITTED, [found], lambda t: None, lambda t: nats, periods=100.0)
+    decision = decide(GIVEN, REFITTED, [found], lambda t: None, lambda t: Unfit(nats), periods=100.0)
     assert decision.verdict == verdict
 
 
@@ -119,7 +133,7 @@ def test_of_a_small_effect_other_shapes_gain_more_than_a_share_before_noise_is_r
 def test_the_second_of_two_effects_must_gain_more_than_other_shapes_would(nats: float, verdict: str):
     # The pair gains 8000 nats, its second effect 1000 of them.
     single, pair = trial(8000.0, 0.02, "coulomb"), trial(9000.0, 0.0001, "coulomb", "cubic_hardening")
-    found = decide(GIVEN, REFITTED, [single, pair], lambda t: None, lambda t: nats, periods=100.0)
+    found = decide(GIVEN, REFITTED, [single, pair], lambda t: None, lambda t: Unfit(nats), periods=100.0)
     assert found.verdict == verdict
 
 
@@ -128,7 +142,7 @@ def test_a_second_effect_is_looked_for_where_more_is_left_than_chance_leaves(lef
     refitted, best = trial(0.0, 1.0), trial(9000.0, left, "coulomb")
     scatter = np.full(2, 5e-4)
     best.prediction = Prediction(best.prediction.error, best.prediction.expected, scatter)
-    assert something_left([refitted, best], refitted, lambda t: 0.0, imposed=False) == worth
+    assert something_left([refitted, best], refitted, lambda t: Unfit(0.0), imposed=False) == worth
 
 
 @pytest.mark.parametrize(
@@ -136,7 +150,7 @@ def test_a_second_effect_is_looked_for_where_more_is_left_than_chance_leaves(lef
 )
 def test_a_second_effect_is_looked_for_where_little_is_left_but_other_shapes_would_explain_much(gained, nats, worth):
     refitted, best = trial(0.0, 1.0), trial(gained, 3e-4, "coulomb")
-    assert something_left([refitted, best], refitted, lambda t: nats, imposed=False) == worth
+    assert something_left([refitted, best], refitted, lambda t: Unfit(nats), imposed=False) == worth
 
 
 def test_a_prediction_whose_filter_says_it_knows_nothing_explains_nothing():
@@ -152,7 +166,7 @@ def test_of_laws_alike_the_one_whose_shape_is_right_is_named(nats: float, named:
     lack = {"quadratic_damping": 900.0, "cubic_damping": nats}
     tried = [trial(9000.0, 0.002, "quadratic_damping"), trial(8990.0, 0.0021, "cubic_damping")]
     lacking = [lack[t.effects[0].cause.id] for t in tried]
-    decision = decide(GIVEN, REFITTED, tried, lambda t: None, lambda t: lacking[tried.index(t)], periods=50.0)
+    decision = decide(GIVEN, REFITTED, tried, lambda t: None, lambda t: Unfit(lacking[tried.index(t)]), periods=50.0)
     assert decision.verdict == ("cause" if named else "undecided")
     assert decision.share(tried[0]) == 0.0 and "shape" in decision.why[id(tried[0])]
     if named:
@@ -164,7 +178,7 @@ def test_where_none_is_right_no_law_of_time_leads(forgiven: bool, named: str):
     tried = [trial(9000.0, 0.004, "coulomb"), trial(9900.0, 0.0005, "stiffness_drift")]
     tried[1].laws = (SimpleNamespace(timed=True, at=(0, 1), otherwise=lambda stiffness: ""),)
     tried[1].structure = SimpleNamespace(terms=(), stiffness_of=lambda at: 1.0)
-    decision = decide(GIVEN, REFITTED, tried, lambda t: None, lambda t: 0.0, periods=100.0, forgiven=forgiven)
+    decision = decide(GIVEN, REFITTED, tried, lambda t: None, lambda t: Unfit(0.0), periods=100.0, forgiven=forgiven)
     assert decision.verdict == "cause" and decision.winner.effects[0].cause.id == named
 
 
@@ -174,7 +188,9 @@ def test_where_none_is_right_no_law_of_time_leads(forgiven: bool, named: str):
 )
 def test_a_single_decay_tells_no_change_with_time_from_one_with_amplitude(one_decay: bool, cause: str, verdict: str):
     found = trial(9000.0, 0.0, cause)
-    decision = decide(GIVEN, REFITTED, [found], lambda t: None, lambda t: 0.0, periods=100.0, one_decay=one_decay)
+    decision = decide(
+        GIVEN, REFITTED, [found], lambda t: None, lambda t: Unfit(0.0), periods=100.0, one_decay=one_decay
+    )
     assert decision.verdict == verdict
     assert ("single decay" in decision.why[id(found)]) == (verdict == "undecided")
 
@@ -183,7 +199,9 @@ def test_a_single_decay_tells_no_change_with_time_from_one_with_amplitude(one_de
 def test_where_none_is_right_a_map_of_the_rest_does_not_speak_against_a_law_that_explains_nearly_all(forgiven, verdict):
     found = trial(9000.0, 0.004, "coulomb")
     mapped = trial(-np.inf, 0.001)
-    decision = decide(GIVEN, REFITTED, [found], lambda t: mapped, lambda t: 0.0, periods=100.0, forgiven=forgiven)
+    decision = decide(
+        GIVEN, REFITTED, [found], lambda t: mapped, lambda t: Unfit(0.0), periods=100.0, forgiven=forgiven
+    )
     assert decision.verdict == verdict
 
 
@@ -193,6 +211,6 @@ def test_where_none_is_right_a_map_of_the_rest_does_not_speak_against_a_law_that
 )
 def test_own_values_are_not_the_cause_where_other_shapes_would_explain_more(nats: float, left: float, verdict: str):
     refitted = trial(10_000.0, left)
-    decision = decide(GIVEN, refitted, [], lambda t: None, lambda t: nats, periods=100.0)
+    decision = decide(GIVEN, refitted, [], lambda t: None, lambda t: Unfit(nats), periods=100.0)
     assert decision.verdict == verdict and decision.winner is refitted
     assert (decision.share(refitted) > 0.5) == (verdict == "parameters")

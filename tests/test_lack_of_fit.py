@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jfsm
-from jfsm.diagnosis._lack_of_fit import lack_of_fit
+from jfsm.diagnosis._lack_of_fit import LackOfFit
 from jfsm.diagnosis._search import fit_model
 from jfsm.identification import prepare_all
 from jfsm.structures import CubicStiffness
@@ -41,7 +41,7 @@ def told(law: Callable[[float, float], float], channel: str, seed: int) -> float
     model = (jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING) + spring).uncertain(cubic_stiffness=0.5)
     records = prepare_all([record], model)
     _, refitted = fit_model(model, records, [UNTIL])
-    return lack_of_fit(refitted, records, [UNTIL])
+    return LackOfFit(records, [UNTIL])(refitted).nats
 
 
 @pytest.mark.parametrize(("channel", "seed"), [("displacement", 1), ("acceleration", 2)])

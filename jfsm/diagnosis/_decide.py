@@ -15,6 +15,7 @@ import numpy as np
 
 from ..identification import prior
 from ..structures import AbstractTerm
+from ._lack_of_fit import Unfit
 from ._trial import Trial
 
 GATE = 0.5
@@ -41,6 +42,8 @@ _UNFIT_SHARE = {0: 0.02, 1: 0.1, 2: 0.05}
 law, and two together stand for many a single one."""
 _UNFIT_OF_WHITE = 0.005
 """The same where innovations are white: all else is right then."""
+_UNFIT_OF_REST = 0.5
+"""Share of innovations that are not white from which other shapes explain too much of them, whatever the gain."""
 _NOT_RIGHT = "explains much of it, but is not of the right shape"
 _ONE_DECAY = "changes with time, which a single decay does not tell from a change with amplitude"
 _ALIKE = 0.3
@@ -90,7 +93,7 @@ def white(trial: Trial) -> bool:
 
 
 def something_left(
-    trials: Sequence[Trial], refitted: Trial, lack_of_fit: Callable[[Trial], float], *, imposed: bool
+    trials: Sequence[Trial], refitted: Trial, lack_of_fit: Callable[[Trial], Unfit], *, imposed: bool
 ) -> bool:
     """Whether the best of them leaves enough for a second effect to be worth a search: what a pair has to gain."""
     best = max(trials, key=lambda t: t.evidence)
@@ -98,7 +101,7 @@ def something_left(
         return False
     if best.prediction.left < NEGLIGIBLE:
         gained = best.evidence - refitted.evidence
-        return bool(best.effects) and lack_of_fit(best) > max(_UNFIT_SHARE[2] * gained, _UNFIT)
+        return bool(best.effects) and lack_of_fit(best).nats > max(_UNFIT_SHARE[2] * gained, _UNFIT)
     return bool(np.all(best.prediction.beyond >= _WORTH_A_SECOND**2 * refitted.prediction.error))
 
 
@@ -151,7 +154,7 @@ def decide(
     refitted: Trial,
     tried: Sequence[Trial],
     stand_in: Callable[[Trial], Trial | None],
-    lack_of_fit: Callable[[Trial], float],
+    lack_of_fit: Callable[[Trial], Unfit],
     periods: float,
     *,
     imposed: bool = False,
@@ -217,6 +220,8 @@ def decide(
         chance[id(winner)] *= 1.0 - 0.5 * min(doubt, 1.0)
         if doubt > 1.0:
             chance[id(winner)], verdict = 0.0, "undecided"
+    if verdict == "consistent" and white(refitted) and lack_of_fit(refitted).nats > 2 * _UNFIT:
+        verdict = "undecided"  # no cause is likelier, and yet it is not noise alone
     if verdict == "consistent":
         winner = given
     elif verdict == "unnamed" and mapped is not None:
@@ -298,10 +303,12 @@ def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
     return ""
 
 
-def _doubt(winner: Trial, gained: float, nats: float) -> float:
+def _doubt(winner: Trial, gained: float, unfit: Unfit) -> float:
     """How far laws of other shapes gain beside the winner, whose last effect gained so many nats; above 1: too much."""
-    share = _UNFIT_OF_WHITE if white(winner) else _UNFIT_SHARE[len(winner.effects)]
-    return max(nats - _UNFIT, 0.0) / max(share * gained - _UNFIT, _UNFIT)
+    if white(winner):
+        return max(unfit.nats - _UNFIT, 0.0) / max(_UNFIT_OF_WHITE * gained - _UNFIT, _UNFIT)
+    by_nats = max(unfit.nats - _UNFIT, 0.0) / max(_UNFIT_SHARE[len(winner.effects)] * gained - _UNFIT, _UNFIT)
+    return max(by_nats, unfit.share / _UNFIT_OF_REST)
 
 
 def _verdict(given: Trial, refitted: Trial, winner: Trial, tried: Sequence[Trial], mapped: Trial | None) -> str:

@@ -15,14 +15,14 @@ from ..structures import AccelerationGain, Cause, ForceGain, Structure
 from ._candidates import Candidate, candidates, chosen_causes, contained, promising
 from ._chance import beside_chance, noise_levels
 from ._clipped import beside_clipping, limited
-from ._decide import GATE, NEGLIGIBLE, decide, explained, something_left, strained, white
+from ._decide import GATE, NEGLIGIBLE, Decision, adequate, decide, explained, something_left, strained, white
 from ._detectable import also_detectable
 from ._diagnosis import Diagnosis
 from ._effect import Effect
 from ._forgiving import forgiving
 from ._gain import Gain, measure_gain
 from ._holdout import split
-from ._lack_of_fit import lack_of_fit
+from ._lack_of_fit import LackOfFit
 from ._next import Leading
 from ._report import Tested, assemble
 from ._residual import residual, stand_in
@@ -116,7 +116,7 @@ def diagnose(
         left_out = [c for c in left_out if c not in within]
     trials = [t.beside(refitted) for t in trials]
     given, refitted, *trials = beside_chance([given, refitted, *trials], model, records, until, key)
-    lack = partial(lack_of_fit, records=records, until=until)
+    lack = LackOfFit(records, until)
     effects = _beside([given, refitted, *trials], refitted, every, lack, imposed=imposed) if max_causes > 1 else []
     if effects:
         found = search_pairs(effects, trials, model, refitted, records, until, steps.next)
@@ -135,7 +135,7 @@ def diagnose(
         compared = {t.effects for t in trials}
         behind = [*behind, *(LeftBehind(t.effects, t.rung - best) for t in before if t.effects not in compared)]
         mapped = partial(stand_in, records=records, until=until)
-        lack = partial(lack_of_fit, records=records, until=until)
+        lack = LackOfFit(records, until)
         decision = decide(given, refitted, trials, mapped, lack, periods, forgiven=True)
     if clipped:
         decision = beside_clipping(decision, clipped, refitted)
@@ -150,8 +150,8 @@ def diagnose(
     steps.next("the gain on held-out readings")
     extended = model if decision.verdict == "consistent" else decision.winner.extended()
     gain, runs = gained(extended)
-    if gain is not None and decision.verdict == "cause" and gain.after > _WORSE * gain.before:
-        decision = decision.refused("runs worse on held-out readings than the model as given", refitted)
+    if gain is not None and (against := _speaks_against(gain, decision)):
+        decision = decision.refused(against, refitted)
         extended = refitted.extended()
         gain, runs = gained(extended)
     steps.next("the missing force")
@@ -166,7 +166,7 @@ def diagnose(
         dropped = {b.effects for b in behind}
         laws = [c for c in tried if c.effects in dropped and not c.effects[0].cause.is_sensor]
         unseen = also_detectable(left_out + laws, model, records, until)
-    tested = Tested(trials, behind, left_out, unseen)
+    tested = Tested(trials, behind, left_out, unseen, lack.known)
     leading = Leading.of(model, [refitted, *trials], decision.share, first, until[0])
     return assemble(decision, clipped, refitted, tested, model, extended, records, missing, gain, runs, leading)
 
@@ -185,6 +185,18 @@ def _believed(
     return records, until, given, refitted
 
 
+def _speaks_against(gain: Gain, decision: Decision) -> str:
+    """Why runs on held-out readings speak against what was found, or nothing."""
+    winner = decision.winner
+    if decision.verdict == "cause" and gain.after > _WORSE * gain.before:
+        return "runs worse on held-out readings than the model as given"
+    if decision.verdict == "cause" and winner.effects and not adequate(winner) and not gain.significant:
+        return "leaves something, and gains no more than chance on held-out readings"
+    if decision.verdict == "unnamed" and gain.closable and gain.closed < GATE:
+        return "closes less than half of the error on held-out readings"
+    return ""
+
+
 def _later(refitted: Trial) -> bool:
     """Whether own values alone leave nothing of what was fitted, but much of what was kept back."""
     fitted, kept_back = (np.sqrt(refitted.prediction.beyond[first::2]) for first in (0, 1))
@@ -192,7 +204,7 @@ def _later(refitted: Trial) -> bool:
 
 
 def _beside(
-    alone: list[Trial], refitted: Trial, every: list[Candidate], lack: Callable[[Trial], float], *, imposed: bool
+    alone: list[Trial], refitted: Trial, every: list[Candidate], lack: LackOfFit, *, imposed: bool
 ) -> list[Effect]:
     """Effects that are worth a try beside others, after what single ones leave."""
     effects = [effect for candidate in every for effect in candidate.effects]

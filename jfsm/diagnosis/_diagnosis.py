@@ -56,6 +56,9 @@ class CandidateResult:
 
     `evidence` counts in nats from the refitted model, `error` is its multi-step prediction error per set as a share of
     the signal, `kappa` the smallest share of the refit's excess power that it explains, `why` the reason in words.
+    Of one that was fitted, `left` is what it leaves beyond noise and chance, as a share of the signal, `whiteness` the
+    largest lag-one correlation of its innovations, and `unfit` the nats that forces of other shapes would gain beside
+    it, where that was asked.
     """
 
     cause: str
@@ -66,6 +69,9 @@ class CandidateResult:
     probability: float
     parameters: dict[str, Estimate]
     why: str
+    left: float | None = None
+    whiteness: float | None = None
+    unfit: float | None = None
 
 
 @dataclass(frozen=True, repr=False)

@@ -60,6 +60,11 @@ class Gain:
     """95 % interval of `closed`, from blocks of the held-out readings drawn anew."""
 
     @property
+    def closable(self) -> bool:
+        """Whether the model as given leaves more than noise would."""
+        return self.before > _CLOSABLE * self.floor
+
+    @property
     def significant(self) -> bool:
         """Whether the extended model predicts better by more than chance."""
         return self.interval[0] > 0

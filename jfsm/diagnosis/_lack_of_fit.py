@@ -29,6 +29,14 @@ _APART = 1e-6
 """Singular values, as shares of the largest, below which shapes are no longer told apart."""
 
 
+class Unfit(NamedTuple):
+    """What other shapes would gain beside a hypothesis: nats beyond what noise lets them in the mean, and the share of
+    its innovations' power that they explain."""
+
+    nats: float
+    share: float = 0.0
+
+
 class _Shown(NamedTuple):
     """Fitted readings of a record in their standard deviations: innovations, and how unknowns and shapes move them."""
 
@@ -37,23 +45,42 @@ class _Shown(NamedTuple):
     by_shape: np.ndarray
 
 
-def lack_of_fit(trial: Trial, records: Sequence[Nuisances], until: Sequence[int]) -> float:
-    """Nats that other shapes would gain where the trial has its laws, beyond what noise lets them gain in the mean.
+class LackOfFit:
+    """What other shapes would gain beside trials of these records; asked again, it remembers."""
 
-    Nothing is known, and 0 returned, where the motion is imposed or runs away.
-    """
+    def __init__(self, records: Sequence[Nuisances], until: Sequence[int]):
+        self.records, self.until = records, until
+        self._known: dict[int, tuple[np.ndarray, Unfit]] = {}
+
+    def __call__(self, trial: Trial) -> Unfit:
+        """What other shapes would gain where the trial has its laws.
+
+        Nothing is known, and nothing gained, where the motion is imposed or runs away.
+        """
+        # A trial that is judged anew, beside another baseline, has the same values still.
+        if id(trial.theta) not in self._known:
+            self._known[id(trial.theta)] = trial.theta, _unfit(trial, self.records, self.until)
+        return self._known[id(trial.theta)][1]
+
+    def known(self, trial: Trial) -> float | None:
+        """The nats, if they were asked before; None otherwise."""
+        return self._known[id(trial.theta)][1].nats if id(trial.theta) in self._known else None
+
+
+def _unfit(trial: Trial, records: Sequence[Nuisances], until: Sequence[int]) -> Unfit:
     if records[0].path is not None:
-        return 0.0
+        return Unfit(0.0)
     posterior = trial.posterior(records, until)
     links = list(dict.fromkeys(law.at for law in trial.laws)) or list(trial.structure.links)
     shapes = _shapes(trial, posterior, links)
     if shapes is None:
-        return 0.0
+        return Unfit(0.0)
     shown = [_shown(trial, posterior, index, shape) for index, shape in enumerate(shapes)]
     error, by_unknown, by_shape = (np.concatenate(parts) for parts in zip(*shown, strict=True))
     left, told = _regressed(by_unknown, error)
     less, more = _regressed(np.hstack([by_unknown, by_shape]), error)
-    return (left - less) / 2 - (more - told) / 2  # half of chi-square, less half of its mean
+    nats = (left - less) / 2 - (more - told) / 2  # half of chi-square, less half of its mean
+    return Unfit(nats, (left - less) / max(left, np.finfo(float).tiny))
 
 
 def _shapes(trial: Trial, posterior: Posterior, links: Sequence[tuple[int, int]]) -> list[np.ndarray] | None:

@@ -1,7 +1,7 @@
 """A decision put into values, words and plain data."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, NamedTuple
 
@@ -32,13 +32,14 @@ _NO_GAIN = "Do not change the model for the sake of its predictions: on held-out
 
 
 class Tested(NamedTuple):
-    """Candidates that were fitted, those that were only so far, those that were not, and what of the latter would have
-    been seen."""
+    """Candidates that were fitted, those that were only so far, those that were not, what of the latter would have been
+    seen, and what other shapes would gain beside a trial, where that was asked."""
 
     trials: list[Trial]
     behind: list[LeftBehind]
     left_out: list[Candidate]
     unseen: Unseen
+    unfit: Callable[[Trial], float | None]
 
 
 def assemble(
@@ -61,7 +62,10 @@ def assemble(
     if decision.verdict == "cause":
         findings += tuple(finding(sensor, units[sensor.at[0]]) for sensor in clipped)
     candidates = (
-        *(_candidate(t, decision, refitted, model, units) for t in sorted(trials, key=lambda t: -t.evidence)),
+        *(
+            _candidate(t, decision, refitted, tested.unfit(t), model, units)
+            for t in sorted(trials, key=lambda t: -t.evidence)
+        ),
         *(_left_behind(b) for b in sorted(tested.behind, key=lambda b: b.nats)),
         *(_passed_over(c) for c in sorted(tested.left_out, key=lambda c: -(c.share or 0.0))),
     )
@@ -216,13 +220,16 @@ def _wrong_values(t: Trial, probability: float, model: Structure, units) -> tupl
     return tuple(f for _, f in sorted(found, key=lambda item: -item[0]))
 
 
-def _candidate(t: Trial, decision: Decision, refitted: Trial, model: Structure, units) -> CandidateResult:
+def _candidate(
+    t: Trial, decision: Decision, refitted: Trial, unfit: float | None, model: Structure, units
+) -> CandidateResult:
     error = np.sqrt(t.prediction.error)
     names = ["training", "holdout"] if error.size == 2 else [f"set {i + 1}" for i in range(error.size)]
     why = decision.why.get(id(t), "") or ("named" if t is decision.winner else "")
     return CandidateResult(
         t.name, t.at, t.evidence - refitted.evidence, {n: float(e) for n, e in zip(names, error, strict=True)},
         decision.kappa.get(id(t), 0.0), decision.share(t), _all_values(t, model, units), why,
+        t.prediction.left, t.whiteness, unfit,
     )  # fmt: skip
 
 
