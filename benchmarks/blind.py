@@ -94,8 +94,7 @@ def answer(diagnosis: Any) -> Row:
     return {
         "verdict": diagnosis.verdict,
         "named": named and {name: getattr(named, name) for name in ("kappa", "left", "whiteness", "unfit")},
-        "interval": gain and gain.interval,
-        "closable": gain and gain.before / gain.floor,
+        "interval": gain and list(gain.interval),
         "findings": [
             {
                 "cause": finding.cause,

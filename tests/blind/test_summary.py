@@ -290,15 +290,17 @@ def diagnosis(gain: SimpleNamespace | None) -> SimpleNamespace:
     found = SimpleNamespace(
         cause="coulomb", at=(0, 1), probability=0.96, parameters={"F": estimate}, rivals=(rival,), sentence="sticks"
     )
-    return SimpleNamespace(verdict="cause", findings=(found,), gain=gain)
+    named = SimpleNamespace(why="named", kappa=0.97, left=0.01, whiteness=0.2, unfit=4.0)
+    return SimpleNamespace(verdict="cause", findings=(found,), candidates=(named,), gain=gain)
 
 
 def test_a_diagnosis_becomes_plain_types():
-    answer = blind.answer(diagnosis(SimpleNamespace(closed=0.98)))
+    answer = blind.answer(diagnosis(SimpleNamespace(closed=0.98, interval=(0.9, 1.0))))
     assert json.loads(json.dumps(answer)) == answer
     assert answer["findings"][0]["parameters"] == {"F": {"value": 2.0, "low": 1.9, "high": 2.1}}
     assert answer["findings"][0]["rivals"] == [{"cause": "quadratic_damping", "at": [0, 1], "probability": 0.04}]
-    assert answer["closed"] == 0.98
+    assert answer["closed"] == 0.98 and answer["interval"] == [0.9, 1.0]
+    assert answer["named"] == {"kappa": 0.97, "left": 0.01, "whiteness": 0.2, "unfit": 4.0}
     assert blind.answer(diagnosis(None))["closed"] is None
 
 
