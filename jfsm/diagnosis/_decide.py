@@ -200,7 +200,9 @@ def decide(
         fewer = [t.evidence for t in (given, refitted, *tried) if len(t.effects) < len(winner.effects)]
 
         def doubt_of(t: Trial) -> float:
-            return _doubt(t, t.evidence - max(fewer), lack_of_fit(t))
+            unfit = lack_of_fit(t)
+            # Where none is right much of the rest has a shape, and says nothing against a law that explains nearly all.
+            return _doubt(t, t.evidence - max(fewer), unfit._replace(share=0.0) if forgiven else unfit)
 
         leader = winner
         winner, doubt = _of_right_shape(leader, passing, chance, doubt_of)
