@@ -29,12 +29,14 @@ def test_of_a_released_structure_that_never_stops_the_last_part_is_held_out():
     assert (until, held.begin, len(held.record)) == (1400, 1400, 2000)
 
 
-def test_a_driven_structure_begins_anew_where_it_was_held_out():
+@pytest.mark.parametrize(("lead", "begins"), [(0, 1400), (500, 900), (5000, 0)])
+def test_a_driven_structure_begins_anew_where_it_was_held_out_or_is_led_there(lead: int, begins: int):
     force = np.cos(3.0 * T)
     record = jfsm.Record(T, force, np.exp(-2.0 * T) + 0.01 * RNG.standard_normal(T.size))
     ((_, until),), (held,) = split(record, 0.3)
-    assert (until, held.begin, len(held.record)) == (1400, 0, 600)
-    assert held.record.time[0] == T[1400]
+    led, begin = held.led_by(lead)
+    assert (until, begins + begin, len(led)) == (1400, 1400, 2000 - begins)
+    assert led.time[0] == T[begins]
 
 
 def test_the_first_part_held_out_is_not_seen():

@@ -15,6 +15,8 @@ from ._holdout import HeldOut
 
 _PERIODS = 2.0
 """Periods, at least, from which the state of a held-out run is estimated; they are not counted."""
+_LEAD = 50.0
+"""Periods, at most, that lead a structure that remembers to what was held out."""
 _END = 20
 """One in so many samples of an imposed motion is its end."""
 _CLOSABLE = 1.05
@@ -107,7 +109,11 @@ def measure_gain(
     }
     curves = []
     pieces: list[np.ndarray] = []
-    for record, begin in ((part.record, part.begin) for part in held):
+    remembers = any(term.states or term.delay is not None for term in extended.terms)
+    for part in held:
+        # What remembers shows at no instant: it is led to where a run begins, or would begin relaxed.
+        lead = math.ceil(_LEAD * 2 * math.pi / (omega * part.record.dt)) if remembers else 0
+        record, begin = part.led_by(lead)
         window = window_for(record, omega)
         counted = _counted(record, max(window, begin))
         runs = {

@@ -23,6 +23,14 @@ class HeldOut:
     record: Record
     begin: int = 0
 
+    def led_by(self, samples: int) -> tuple[Record, int]:
+        """The record from so many samples before what was held out, and where that begins in it.
+
+        A released structure is led there from its release.
+        """
+        lead = min(samples, self.begin) if self.record.driven else self.begin
+        return self.record[self.begin - lead :], lead
+
 
 def split(
     record: Record | Sequence[Record], holdout, first: bool = False
@@ -58,7 +66,7 @@ def _last(record: Record, share: float) -> tuple[tuple[Record, int], HeldOut]:
     """The last part held out; of a released structure that of its motion, which is run from the release."""
     moving = len(record) if record.driven else moves_for(record)
     end = int(round((1 - share) * moving))
-    return (record, end), HeldOut(record[end:]) if record.driven else HeldOut(record[:moving], end)
+    return (record, end), HeldOut(record[:moving], end)
 
 
 def moves_for(record: Record) -> int:
