@@ -111,7 +111,7 @@ def answer(diagnosis: Any) -> Row:
             }
             for finding in diagnosis.findings
         ],
-        "closed": None if gain is None else float(gain.closed),
+        "closed": None if gain is None or not gain.closable else float(gain.closed),
         "error": None,
     }
 

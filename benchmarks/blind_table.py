@@ -221,7 +221,7 @@ def _figures_of_one(rows: Sequence[Row]) -> dict[str, Share | float]:
     causes = [row for row in rows if kind(row) == "cause"]
     quiet = [row for row in rows if kind(row) in ("none", "parameters")]
     outside = [row for row in rows if kind(row) == "outside"]
-    unnamed = [row for row in outside if row["verdict"] == "unnamed"]
+    unnamed = [row for row in outside if row["verdict"] == "unnamed" and row["closed"] is not None]
     inside = [covered for row in answered for covered in covers(row).values()]
     closed = [row["closed"] for row in answered if kind(row) == "cause" and row["closed"] is not None]
     alike = [row for row in causes if twins(row)]
@@ -238,7 +238,7 @@ def _figures_of_one(rows: Sequence[Row]) -> dict[str, Share | float]:
         "silent where no law is": Share.of(quiet, silent),
         "  with nothing wrong": Share.of([row for row in quiet if kind(row) == "none"], silent),
         "outside: none named": Share.of(outside, exact),
-        "  a map half closes it": Share.of(unnamed, lambda row: (row["closed"] or 0.0) >= 0.5),
+        "  a map half closes it": Share.of(unnamed, lambda row: row["closed"] >= 0.5),
         "intervals that cover": Share(sum(inside), len(inside)),
         f"right where p > {CONFIDENT}": Share.of([row for row in answered if confident(row)], exact),
         "calibration error": calibration_error(answered),

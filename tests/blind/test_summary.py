@@ -295,13 +295,15 @@ def diagnosis(gain: SimpleNamespace | None) -> SimpleNamespace:
 
 
 def test_a_diagnosis_becomes_plain_types():
-    answer = blind.answer(diagnosis(SimpleNamespace(closed=0.98, interval=(0.9, 1.0))))
+    answer = blind.answer(diagnosis(SimpleNamespace(closed=0.98, interval=(0.9, 1.0), closable=True)))
     assert json.loads(json.dumps(answer)) == answer
     assert answer["findings"][0]["parameters"] == {"F": {"value": 2.0, "low": 1.9, "high": 2.1}}
     assert answer["findings"][0]["rivals"] == [{"cause": "quadratic_damping", "at": [0, 1], "probability": 0.04}]
     assert answer["closed"] == 0.98 and answer["interval"] == [0.9, 1.0]
     assert answer["named"] == {"kappa": 0.97, "left": 0.01, "whiteness": 0.2, "unfit": 4.0}
     assert blind.answer(diagnosis(None))["closed"] is None
+    nothing = SimpleNamespace(closed=0.0, interval=(0.0, 0.0), closable=False)
+    assert blind.answer(diagnosis(nothing))["closed"] is None
 
 
 def test_a_diagnosis_that_fails_becomes_a_row_with_its_error(monkeypatch: pytest.MonkeyPatch):
