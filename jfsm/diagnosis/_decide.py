@@ -4,7 +4,8 @@ A cause must do three things: be more probable than its absence, explain at leas
 model leaves, and do so on every set of samples, held-out ones included. Where the winner leaves nothing but noise, its
 evidence is trusted as it stands; where it does not, evidence counts no more than some tens of independent looks, and
 no cause is more probable than the share of the power that it explains. And no cause is named beside which laws of other
-shapes would gain more than a small share of what it gains itself; up to there it is the less sure, by half at most.
+shapes would gain more than a small share of what it gains itself, or explain half of what it leaves; up to there it is
+the less sure, by half at most. Nor is a record called consistent where they explain more than noise.
 """
 
 import math

@@ -15,7 +15,7 @@ from ..structures import AccelerationGain, Cause, ForceGain, Structure
 from ._candidates import Candidate, candidates, chosen_causes, contained, promising
 from ._chance import beside_chance, noise_levels
 from ._clipped import beside_clipping, limited
-from ._decide import GATE, NEGLIGIBLE, Decision, adequate, decide, explained, something_left, strained, white
+from ._decide import GATE, NEGLIGIBLE, Decision, decide, explained, something_left, strained, white
 from ._detectable import also_detectable
 from ._diagnosis import Diagnosis
 from ._effect import Effect
@@ -187,11 +187,8 @@ def _believed(
 
 def _speaks_against(gain: Gain, decision: Decision) -> str:
     """Why runs on held-out readings speak against what was found, or nothing."""
-    winner = decision.winner
     if decision.verdict == "cause" and gain.after > _WORSE * gain.before:
         return "runs worse on held-out readings than the model as given"
-    if decision.verdict == "cause" and winner.effects and not adequate(winner) and not gain.significant:
-        return "leaves something, and gains no more than chance on held-out readings"
     if decision.verdict == "unnamed" and gain.closable and gain.closed < GATE:
         return "closes less than half of the error on held-out readings"
     return ""
