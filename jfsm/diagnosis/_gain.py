@@ -64,7 +64,7 @@ class Gain:
     @property
     def closable(self) -> bool:
         """Whether the model as given leaves more than noise would."""
-        return self.before > _CLOSABLE * self.floor
+        return _closable(self.before, self.floor)
 
     @property
     def significant(self) -> bool:
@@ -81,7 +81,11 @@ class Gain:
 
 
 def _closed(before: float, after: float, floor: float) -> float:
-    return min((before - after) / (before - floor), 1.0) if before > _CLOSABLE * floor else 0.0
+    return min((before - after) / (before - floor), 1.0) if _closable(before, floor) else 0.0
+
+
+def _closable(before: float, floor: float) -> bool:
+    return before > _CLOSABLE * floor
 
 
 def window_for(record: Record, omega: float) -> int:

@@ -289,16 +289,14 @@ def _said(finding: Finding, known: Mapping[str, Cause]) -> str:
     """A finding as a sentence; where its name is open, its class comes first, and then the names that it may have."""
     cause, where = known[finding.cause], "-".join(map(str, finding.at))
     lacks = "The record shows" if cause.is_sensor else "The model lacks"
+    others = [(known[r.cause].label, r.probability) for r in finding.rivals if r.cause in known]
     if finding.probability < _SURE and finding.kind_probability - finding.probability > RIVAL:
-        names = [(cause.label, finding.probability)]
-        names += [(known[r.cause].label, r.probability) for r in finding.rivals if r.cause in known]
-        listed = ", ".join(f"{name} ({chance:.0%})" for name, chance in names)
+        listed = ", ".join(f"{name} ({chance:.0%})" for name, chance in [(cause.label, finding.probability), *others])
         return f"{lacks} {finding.kind} at {where} ({finding.kind_probability:.0%}); its law is open: {listed}."
     said = f"{lacks} {cause.label} at {where}: {finding.sentence}."
     if finding.probability >= 0.5 or not finding.rivals:
         return said
-    others = [known[r.cause].label for r in finding.rivals if r.cause in known]
-    return f"{said} By this record it may as well be {' or '.join(dict.fromkeys(others))}."
+    return f"{said} By this record it may as well be {' or '.join(dict(others))}."
 
 
 def _record(records: list[Nuisances]) -> dict[str, Any]:
