@@ -48,3 +48,19 @@ def test_noise_is_no_excuse_for_a_value_that_is_off(record):
     assert drawn is not first, "nothing was drawn"
     assert drawn.prediction.left > 0.8 * first.prediction.left > NEGLIGIBLE
     assert not adequate(drawn)
+
+
+def test_what_white_innovations_tell_of_a_channel_that_gave_but_a_guess_holds_for_all(record):
+    model = jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING) + Coulomb(FRICTION, at=(0, 1))
+    records = prepare_all([record], model)
+    given, refitted = fit_model(model, records, UNTIL)
+    louder = 2 * np.log(3.0)  # three times the noise
+    theta = np.array([louder if u.path == "noise@1" else t for u, t in zip(given.unknowns, given.theta, strict=True)])
+    guessed = np.array([True, False, True])
+    best = replace(
+        given, theta=theta, evidence=refitted.evidence + 1, whiteness=0.0, trusted=guessed, noise=np.zeros(3)
+    )
+    untrusting = [replace(records[0], trusted=guessed)]
+    _, other = beside_chance([best, refitted], model, untrusting, UNTIL, jax.random.key(1))
+    more = 8 * float(records[0].floor[1] / records[0].spread[1]) ** 2
+    np.testing.assert_allclose(other.prediction.expected - refitted.prediction.expected, more, rtol=1e-6)

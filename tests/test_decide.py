@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.diagnosis._decide import decide, something_left
+from jfsm.diagnosis._decide import decide, settled, something_left
 from jfsm.diagnosis._effect import Effect
 from jfsm.diagnosis._lack_of_fit import Unfit
 from jfsm.diagnosis._trial import Prediction
@@ -182,17 +182,23 @@ def test_where_none_is_right_no_law_of_time_leads(forgiven: bool, named: str):
     assert decision.verdict == "cause" and decision.winner.effects[0].cause.id == named
 
 
-@pytest.mark.parametrize(
-    ("one_decay", "cause", "verdict"),
-    [(False, "stiffness_drop", "cause"), (True, "stiffness_drop", "undecided"), (True, "coulomb", "cause")],
-)
-def test_a_single_decay_tells_no_change_with_time_from_one_with_amplitude(one_decay: bool, cause: str, verdict: str):
-    found = trial(9000.0, 0.0, cause)
+@pytest.mark.parametrize(("why_not", "verdict"), [("", "cause"), ("changes with time", "undecided")])
+def test_what_the_motion_leaves_untold_is_no_finding(why_not: str, verdict: str):
+    found = trial(9000.0, 0.0, "stiffness_drop")
     decision = decide(
-        GIVEN, REFITTED, [found], lambda t: None, lambda t: Unfit(0.0), periods=100.0, one_decay=one_decay
+        GIVEN, REFITTED, [found], lambda t: None, lambda t: Unfit(0.0), periods=100.0, untold=lambda t: why_not
     )
-    assert decision.verdict == verdict
-    assert ("single decay" in decision.why[id(found)]) == (verdict == "undecided")
+    assert decision.verdict == verdict and decision.why[id(found)] == why_not
+
+
+@pytest.mark.parametrize(
+    ("left", "otherwise", "enough"), [(0.0, "", True), (0.0, "it is another law", False), (0.01, "", False)]
+)
+def test_the_search_is_settled_by_a_law_that_leaves_nothing_and_is_what_it_is_called(left, otherwise, enough):
+    best = trial(9000.0, left, "coulomb")
+    best.laws = (SimpleNamespace(at=(0, 1), otherwise=lambda stiffness: otherwise),)
+    best.structure = SimpleNamespace(stiffness_of=lambda at: 1.0)
+    assert settled([GIVEN, REFITTED, best]) == enough
 
 
 @pytest.mark.parametrize(("forgiven", "verdict"), [(False, "unnamed"), (True, "cause")])

@@ -152,6 +152,13 @@ def test_a_cause_that_makes_held_out_runs_worse_is_not_named(believed, monkeypat
     assert refused.why == "runs worse on held-out readings than the model as given"
 
 
+def test_held_out_runs_whose_start_noise_hides_say_nothing_against_a_cause(believed, monkeypatch):
+    hidden = Gain(before=0.1, refitted=0.1, after=0.2, floor=0.19, channels={}, interval=(-2.0, -0.5))
+    monkeypatch.setattr("jfsm.diagnosis._diagnose.measure_gain", lambda *arguments: (hidden, []))
+    d = jfsm.diagnose(made(duffing), believed, causes=FEW, key=jax.random.key(0))
+    assert d.verdict == "cause" and "Do not change the model" in d.advice
+
+
 def test_a_cause_that_gains_no_more_than_chance_comes_with_the_advice_to_leave_the_model(believed, monkeypatch):
     hardly = Gain(before=0.1, refitted=0.1, after=0.099, floor=0.01, channels={}, interval=(-0.1, 0.2))
     monkeypatch.setattr("jfsm.diagnosis._diagnose.measure_gain", lambda *arguments: (hardly, []))
@@ -343,6 +350,23 @@ def test_a_buckled_spring_that_leaves_one_well_is_another_law():
     law = jfsm.causes()["double_well"].effect
     assert "one well" in law(8.0, 1.0, at=(0, 1)).otherwise(9.0)
     assert law(10.0, 1.0, at=(0, 1)).otherwise(9.0) == ""
+
+
+def test_a_loop_without_width_is_no_memory():
+    law = jfsm.causes()["bouc_wen"].effect
+    assert "width" in law(9.0, 0.01, -2.0, 2.0, at=(0, 1)).otherwise(9.0)
+    assert law(9.0, 0.1, -2.0, 2.0, at=(0, 1)).otherwise(9.0) == ""
+
+
+def test_where_no_law_fits_those_are_fitted_too_that_explain_less_of_the_missing_force(monkeypatch, believed):
+    def last(tried):
+        left_out = [c for c in tried if c.effects[0].cause.id == "cubic_hardening"]
+        return [c for c in tried if c not in left_out], left_out
+
+    monkeypatch.setattr("jfsm.diagnosis._diagnose.promising", last)
+    causes = ("cubic_hardening", "quadratic_damping", "coulomb")
+    d = jfsm.diagnose(made(duffing), believed, causes=causes, max_causes=1, key=jax.random.key(0))
+    assert [f.cause for f in d.findings] == ["cubic_hardening"]
 
 
 @pytest.mark.parametrize("cause", ["stribeck", "lugre"])

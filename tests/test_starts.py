@@ -13,6 +13,7 @@ import jfsm
 from jfsm.dynamics import lower
 from jfsm.dynamics._along import force_along
 from jfsm.dynamics._start import starting_state
+from jfsm.estimation import Latent
 from jfsm.identification import about_a_rest, missing_force, place, prepare, scale_of, starts
 
 T = np.arange(1200) * 0.06
@@ -216,6 +217,30 @@ def test_shapes_too_stiff_for_the_samples_leave_the_others_to_begin_from():
     bristles = MODEL + jfsm.LuGre(1.0, 1.0, 0.3, 50.0, 1.0, at=(0, 1))
     first = starts(bristles, prepare(coarse, bristles))[0].values()
     assert first["lugre@0-1.F"] == pytest.approx(1.0, rel=0.5)
+
+
+def along_a_decay(dt: float, law: jfsm.LuGre) -> float:
+    """Share of the force of bristles along a decay that the best start explains."""
+    time = np.arange(0.0, 30.0, dt)
+    x, v = np.exp(-0.3 * time) * np.cos(5.0 * time), -5.0 * np.exp(-0.3 * time) * np.sin(5.0 * time)
+    rest = jfsm.Structure.sdof(mass=1.0, stiffness=25.0, damping=0.6)
+    motion = jnp.asarray(x[:, None]), jnp.asarray(v[:, None]), jnp.asarray(time)
+    force = np.asarray(force_along(lower(jfsm.Structure([1.0], [law])), *motion, substeps=64))
+    latent = Latent(x[:, None], v[:, None], force, np.ones_like(force), np.ones(time.size, bool))
+    prepared = prepare(jfsm.Record(time, None, x, v), rest)
+    share = place(law, latent, rest, scale_of(prepared, rest), prepared)[0].share
+    assert share is not None
+    return share
+
+
+def test_bristles_between_those_of_the_grid_are_found():
+    law = jfsm.LuGre(0.4, 0.5, 0.5, 25.0, 4.0, at=(0, 1))
+    assert along_a_decay(0.01, law) > 0.98
+
+
+def test_bristles_too_stiff_for_the_usual_steps_are_followed_by_finer_ones():
+    law = jfsm.LuGre(0.4, 0.6, 0.15, 100.0, 10.0, at=(0, 1))
+    assert along_a_decay(0.1, law) > 0.95
 
 
 class Unbounded(jfsm.CubicStiffness):

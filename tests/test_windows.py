@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.diagnosis._trial import _extent, _windows
+from jfsm.diagnosis._trial import _windows, extent
 from jfsm.identification import Nuisances, prepare
 
 MASS, DAMPING = 2.0, 8.0
@@ -25,8 +25,7 @@ def prepared(stiffness: float) -> Nuisances:
 def test_what_a_spring_holds_is_predicted_for_some_periods_and_its_error_is_a_share_of_all_motion():
     n = prepared(stiffness=50.0)
     assert n.period == pytest.approx(2 * np.pi * np.sqrt(MASS / 50.0), rel=1e-6)
-    _, free = _windows(n)
-    assert _extent(n, free) == pytest.approx(n.spread)
+    assert extent(n) == pytest.approx(n.spread)
 
 
 def test_what_nothing_holds_is_predicted_until_damping_stops_it_and_its_error_is_a_share_of_that_motion():
@@ -36,4 +35,14 @@ def test_what_nothing_holds_is_predicted_until_damping_stops_it_and_its_error_is
     lengths = np.diff(np.flatnonzero(np.diff(free.astype(int))))[::2]
     assert np.all(np.abs(lengths[:-1] - MASS / DAMPING / 0.01) <= 2) and not np.any(used[free])
     # A sine of unit size moves by 0.3/√2 in a second; evenly spread over a window of T seconds by T/√12 times as much.
-    assert _extent(n, free)[0] == pytest.approx(0.3 / np.sqrt(2) * 0.25 / np.sqrt(12), rel=0.1)
+    assert extent(n)[0] == pytest.approx(0.3 / np.sqrt(2) * 0.25 / np.sqrt(12), rel=0.1)
+
+
+def test_steps_of_a_decay_are_short_enough_for_its_beginning():
+    time = np.arange(4000) * 0.01
+    envelope = np.exp(-2.0 * time)
+    x, v = envelope * np.sin(5.0 * time), envelope * (5.0 * np.cos(5.0 * time) - 2.0 * np.sin(5.0 * time))
+    model = jfsm.Structure.sdof(mass=MASS, stiffness=58.0, damping=DAMPING)
+    bristles = model + jfsm.LuGre(0.1, 0.1, 1.0, 20.0, 1.0, at=(0, 1))  # 20/0.1·5 = 1000 rad/s at first
+    n = prepare(jfsm.Record(time, None, x, v), model).resolving([bristles])
+    assert 1000.0 * n.record.dt / n.fine.substeps < 2.8  # where Runge-Kutta of order four is stable

@@ -18,7 +18,7 @@ from ..records import Record
 from ..structures import Clipping, Structure
 from ._decide import adequate, white
 from ._gain import remeasured
-from ._trial import Prediction, Trial, free_run, predict
+from ._trial import Prediction, Trial, extent, free_run, predict, sets
 
 _DRAWS = 6
 
@@ -26,15 +26,22 @@ _DRAWS = 6
 def beside_chance(
     trials: Sequence[Trial], model: Structure, records: Sequence[Nuisances], until: Sequence[int], key: jax.Array
 ) -> list[Trial]:
-    """The trials; the most probable, if its innovations are white and yet it leaves something, with draws of noise."""
+    """The trials; the most probable, if its innovations are white and yet it leaves something, with draws of noise.
+
+    Its innovations tell noise of which the channel gave but a guess: all trials are judged beside that.
+    """
+    best = max(trials, key=lambda t: t.evidence)
+    if not white(best):
+        return list(trials)
+    trials = _as_noisy(trials, best, records, until)
     best = max(trials, key=lambda t: t.evidence)
     limits = any(isinstance(sensor, Clipping) for sensor in model.sensors)
-    if adequate(best) or not white(best) or limits or records[0].path is not None:
-        return list(trials)
+    if adequate(best) or limits or records[0].path is not None:
+        return trials
     posterior = best.posterior(records, until)
     runs = [free_run(posterior, best.theta, index) for index in range(len(records))]
     if not all(np.all(np.isfinite(run)) for run in runs):
-        return list(trials)
+        return trials
     levels = [noise_levels(best, n, index) for index, n in enumerate(records)]
     seeds = np.asarray(jax.random.key_data(key)).astype(np.uint32).tolist()
 
@@ -51,6 +58,20 @@ def beside_chance(
         scatter=np.maximum(found.scatter, errors.std(0, ddof=1)),
     )
     return [replace(t, prediction=prediction) if t is best else t for t in trials]
+
+
+def _as_noisy(trials: Sequence[Trial], best: Trial, records: Sequence[Nuisances], until: Sequence[int]) -> list[Trial]:
+    """The trials, whose predictions leave as much noise as the best of them found in channels that gave but a guess."""
+    more = []
+    for index, nuisances in enumerate(records):
+        levels = noise_levels(best, nuisances, index)
+        found = np.array([levels[channel] for channel in nuisances.channels])
+        beyond = np.where(nuisances.trusted, 0.0, np.maximum(found**2 - nuisances.floor**2, 0.0))
+        power = float(np.sum(beyond / extent(nuisances) ** 2))
+        more += [power] * len(sets(nuisances, until[index]))
+    return [
+        replace(t, prediction=replace(t.prediction, expected=t.prediction.expected + np.array(more))) for t in trials
+    ]
 
 
 def noise_levels(trial: Trial, nuisances: Nuisances, index: int = 0) -> dict[tuple, float]:

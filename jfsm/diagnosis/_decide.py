@@ -46,7 +46,6 @@ _UNFIT_OF_WHITE = 0.005
 _UNFIT_OF_REST = 0.5
 """Share of innovations that are not white from which other shapes explain too much of them, whatever the gain."""
 _NOT_RIGHT = "explains much of it, but is not of the right shape"
-_ONE_DECAY = "changes with time, which a single decay does not tell from a change with amplitude"
 _ALIKE = 0.3
 """Probability of another law of its family, in those of a law that is not of the right shape, that may take its place.
 """
@@ -91,6 +90,12 @@ def adequate(trial: Trial) -> bool:
 def white(trial: Trial) -> bool:
     """Whether a trial's innovations are white, and of the size of the floor where that is known."""
     return trial.whiteness < _WHITE and bool(np.all(np.abs(trial.noise[trial.trusted]) < _SCALE))
+
+
+def settled(trials: Sequence[Trial]) -> bool:
+    """Whether the best of them leaves nothing but noise, and its laws are what they are called."""
+    best = max(trials, key=lambda t: t.evidence)
+    return adequate(best) and not any(law.otherwise(best.structure.stiffness_of(law.at)) for law in best.laws)
 
 
 def something_left(
@@ -160,7 +165,7 @@ def decide(
     *,
     imposed: bool = False,
     forgiven: bool = False,
-    one_decay: bool = False,
+    untold: Callable[[Trial], str] = lambda t: "",
 ) -> Decision:
     """Verdict over the model as given, the model refitted, every candidate, and a map that stands for any law.
 
@@ -168,8 +173,8 @@ def decide(
     `lack_of_fit` tells what other laws would explain beside a trial's; it is asked of a cause that would be named.
     Where some force is `forgiven` to all none of them is right: laws of time would explain whatever is left, and a map
     of the little that a law leaves does not speak against it. Along an `imposed` motion a map repeats even the small
-    faults of a law, one by one, as often as it repeats itself. In `one_decay` a spring or damper that changes with time
-    may be one that changes with the amplitude: it is a rival, and no finding.
+    faults of a law, one by one, as often as it repeats itself. What the motion leaves `untold`, and why, is a
+    rival, and no finding.
     """
     kappa, why = {}, {}
     passing = []
@@ -212,9 +217,9 @@ def decide(
         for t in passing:
             if families(t) == families(winner):
                 chance[id(t)] *= 1.0 - 0.5 * min(doubt, 1.0)
-        ages = one_decay and "time" in families(winner)
-        if doubt > 1.0 or ages:
-            why[id(winner)], chance[id(winner)] = _ONE_DECAY if ages else _NOT_RIGHT, 0.0
+        not_shown = untold(winner)
+        if doubt > 1.0 or not_shown:
+            why[id(winner)], chance[id(winner)] = not_shown or _NOT_RIGHT, 0.0
             mapped = stand_in(refitted)
             stands_in = mapped is not None and explained(mapped, refitted) >= GATE
             verdict, winner = ("unnamed", refitted) if stands_in else ("undecided", winner)

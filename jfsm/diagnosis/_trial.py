@@ -155,17 +155,17 @@ def predict(posterior: Posterior, theta: np.ndarray, slight: bool = False) -> Pr
         errors, expected, scatter = [], [], []
         for index, nuisances in enumerate(posterior.records):
             use, scored = _windows(nuisances)
-            extent = _extent(nuisances, scored)
+            size = extent(nuisances)
             found = posterior.innovations(theta, index, use=use, noise_scales=False, slack=slack)
             truth = found if slack == 0 else posterior.innovations(theta, index, use=use, noise_scales=False)
             alive = np.asarray(nuisances.readings.use)[: nuisances.samples] > 0
             for chosen in sets(nuisances, posterior.until[index]):
                 mask = (scored & chosen)[:, None] & alive
                 count = np.maximum(mask.sum(0), 1)
-                share = np.clip(found.error / extent, -_RUN_AWAY, _RUN_AWAY)
+                share = np.clip(found.error / size, -_RUN_AWAY, _RUN_AWAY)
                 errors.append(np.sum(np.sum(np.where(mask, share**2, 0.0), 0) / count))
-                noise = np.sum(np.where(mask, truth.variance, 0.0), 0) / count / extent**2
-                white = np.minimum(np.asarray(nuisances.readings.variance) / extent**2, noise)
+                noise = np.sum(np.where(mask, truth.variance, 0.0), 0) / count / size**2
+                white = np.minimum(np.asarray(nuisances.readings.variance) / size**2, noise)
                 # Readings err each by itself, a state that was filtered for a whole window: in two directions.
                 windows = np.maximum(count * nuisances.record.dt / (nuisances.period * _PREDICTED), 1.0)
                 expected.append(np.sum(noise))
@@ -195,10 +195,11 @@ def _windows(nuisances: Nuisances) -> tuple[np.ndarray, np.ndarray]:
     return np.repeat((~free)[:, None], channels, 1).astype(float), free
 
 
-def _extent(nuisances: Nuisances, free: np.ndarray) -> np.ndarray:
+def extent(nuisances: Nuisances) -> np.ndarray:
     """Spread (channels,) of the readings; where a window is but a part of a slow motion, of those in a window."""
     if nuisances.period * nuisances.omega >= 2 * np.pi * (1 - 1e-9):
         return nuisances.spread
+    free = _windows(nuisances)[1]
     values = np.asarray(nuisances.readings.values)[: nuisances.samples]
     windows = np.split(values, np.flatnonzero(np.diff(free.astype(int))) + 1)
     about = np.concatenate([window - window.mean(0) for window in windows])

@@ -10,17 +10,22 @@ from ._grid import delayed_along
 from ._plant import Plant
 from ._stepper import runge_kutta
 
-_SUBSTEPS = 4
+SUBSTEPS = 4
 """Steps of a hidden state per sample; the motion is straight in between."""
 
 
 @eqx.filter_jit
 def force_along(
-    plant: Plant, x: Float[Array, "n dof"], v: Float[Array, "n dof"], time: Float[Array, " n"]
+    plant: Plant,
+    x: Float[Array, "n dof"],
+    v: Float[Array, "n dof"],
+    time: Float[Array, " n"],
+    *,
+    substeps: int = SUBSTEPS,
 ) -> Float[Array, "n dof"]:
     """Force [N] of everything but the linear springs and dashpots along a motion; friction slides."""
     step = time[1] - time[0]
-    z = _hidden_along(plant, x, v, time, step)
+    z = _hidden_along(plant, x, v, time, step, substeps)
 
     def one(x, v, z, t):
         linear = jnp.sum(plant.stiffness * x[None, :], 1) + jnp.sum(plant.damping * v[None, :], 1)
@@ -36,7 +41,7 @@ def force_along(
     return force + delayed_along(plant, x, v, time) if len(plant.delayed) else force
 
 
-def _hidden_along(plant: Plant, x, v, time, step):
+def _hidden_along(plant: Plant, x, v, time, step, substeps: int):
     if not plant.hidden:
         return jnp.zeros((x.shape[0], 0))
     zero = jnp.zeros(())
@@ -48,11 +53,11 @@ def _hidden_along(plant: Plant, x, v, time, step):
             return hidden_rate(plant, x0 + s * (x1 - x0), v0 + s * (v1 - v0), z, t + s * step, zero)
 
         def substep(z, i):
-            begin, end = i / _SUBSTEPS, (i + 1) / _SUBSTEPS
-            after = runge_kutta(rate, z, step / _SUBSTEPS, (begin, (begin + end) / 2, end))
+            begin, end = i / substeps, (i + 1) / substeps
+            after = runge_kutta(rate, z, step / substeps, (begin, (begin + end) / 2, end))
             return settle(plant, x0 + end * (x1 - x0), after), None
 
-        return jax.lax.scan(substep, z, jnp.arange(_SUBSTEPS))[0], z
+        return jax.lax.scan(substep, z, jnp.arange(substeps))[0], z
 
     last, z = jax.lax.scan(sample, hidden_start(plant, x[0], v[0]), (x[:-1], x[1:], v[:-1], v[1:], time[:-1]))
     return jnp.concatenate([z, last[None, :]])

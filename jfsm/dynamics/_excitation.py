@@ -27,6 +27,8 @@ stay stable.
 """
 _KINKED_SUBSTEPS = 2
 """Steps per sample at least for hidden states, which yield and slide at instants of their own."""
+_CREST = 4.0
+"""Peak of what goes on all the time, in root mean squares, at most."""
 _STABLE_ANGLE = 2.6
 """Largest angle per step at which Runge-Kutta of order four does not blow up by itself."""
 
@@ -88,11 +90,13 @@ def relaxed_jacobian(plant: Plant, x, v):
 
 
 def typical_speed(record: Record) -> float:
-    """Size of the velocity, from whatever response there is; 0 where there is none."""
+    """Size of the velocity, from whatever response there is; 0 where there is none.
+
+    Of a decay it is that of its beginning.
+    """
     speeds = []
     for (kind, _), y in record.responses.items():
-        change = np.std(np.diff(y)) / record.dt
-        spread = np.std(y)
+        change, spread = _size(np.diff(y)) / record.dt, _size(y)
         if kind == "velocity":
             speeds.append(spread)
         elif kind == "displacement":
@@ -100,6 +104,11 @@ def typical_speed(record: Record) -> float:
         elif change > 0:
             speeds.append(spread**2 / change)
     return float(max(speeds, default=0.0))
+
+
+def _size(y: np.ndarray) -> float:
+    """Root mean square about the mean, or a share of the peak where that is far above it."""
+    return max(float(np.std(y)), float(np.max(np.abs(y - np.mean(y)))) / _CREST)
 
 
 def measured_force(record: Record, dof: int, clipped_at: Mapping[tuple[str, int], float] | None = None) -> np.ndarray:

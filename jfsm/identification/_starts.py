@@ -18,7 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.stats import qmc
 
-from ..dynamics._along import force_along
+from ..dynamics._along import SUBSTEPS, force_along
 from ..dynamics._excitation import bucket
 from ..dynamics._imposed import Imposed
 from ..dynamics._needed import force_needed
@@ -40,6 +40,8 @@ _SPRING, _DASHPOT, _CONSTANT = 0.15, 1.0, 10.0
 """How far springs and dashpots may be off, as shares of themselves, and a constant force as a share of the missing."""
 _CORRELATED = 20.0
 """Samples of a smoothed force that count as one."""
+_FINER = 8
+"""Times as many steps for hidden states that the usual ones cannot follow, as stiff bristles'."""
 _RUN_AWAY = 1e9
 """Force of a hidden state that its steps could not follow, as a multiple of the missing one."""
 _NO_FORCE = 1e100
@@ -183,7 +185,7 @@ def place(
         return [Placed(law, None, math.inf)]
     regression = regression.with_doubt(columns)
     ranked = regression.ranked(columns, rows, sign, scale)
-    grid = {p.name: np.unique([row[p.name] for row in rows]) for p in law.parameters if p.free and not p.force}
+    grid = {p.name: np.unique([row[p.name] for row in rows]) for p in law.parameters if p.free}
     grid = {name: values for name, values in grid.items() if values.size > 1}
     found: list[_Shape] = []
     for shape in ranked:
@@ -260,15 +262,22 @@ class _Regression:
 
     def columns(self, rows: list[dict[str, float]]) -> tuple[np.ndarray, list[dict[str, float]]]:
         """Forces (rows, samples x dof) of those shapes that do not run away along the motion, and these."""
-        kind = type(self.law)
-        lots = list(_lots(kind, rows))
-        forces = np.concatenate(
-            [_forces(self.law, lot, self.structure, self.motion)[: len(some)] for some, lot in lots]
-        )
-        forces = forces[:, : len(self.moves)]
-        stable = np.max(np.abs(forces), (1, 2)) < _RUN_AWAY * np.max(self.spread)  # false for what is no number, too
+        forces = self._forces(rows)
+        stable = self._stable(forces)
+        if type(self.law).states and not np.all(stable):
+            stiff = np.flatnonzero(~stable)
+            forces[stiff] = self._forces([rows[k] for k in stiff], _FINER)
+            stable = self._stable(forces)
         rows = list(compress(rows, stable))
         return (forces[stable][:, self.moves] / self.spread).reshape(len(rows), self.missing.size), rows
+
+    def _forces(self, rows: list[dict[str, float]], finer: int = 1) -> np.ndarray:
+        lots = _lots(type(self.law), rows)
+        forces = [_forces(self.law, lot, self.structure, self.motion, finer)[: len(some)] for some, lot in lots]
+        return np.concatenate(forces)[:, : len(self.moves)]
+
+    def _stable(self, forces: np.ndarray) -> np.ndarray:
+        return np.max(np.abs(forces), (1, 2)) < _RUN_AWAY * np.max(self.spread)  # false for what is no number, too
 
     def linear(self, columns: np.ndarray) -> bool:
         """Whether springs, dashpots and constants make all of these forces, so that regression cannot tell."""
@@ -383,7 +392,7 @@ def _still_afterwards(latent: Latent, time: np.ndarray) -> tuple[jax.Array, jax.
     return jnp.asarray(x), jnp.asarray(v), jnp.asarray(np.concatenate([time, later]))
 
 
-def _forces(law: AbstractTerm, numbers: np.ndarray, structure: Structure, motion) -> np.ndarray:
+def _forces(law: AbstractTerm, numbers: np.ndarray, structure: Structure, motion, finer: int) -> np.ndarray:
     """Forces (rows, n, dof) of a law along a motion for rows of its numbers."""
     unit = type(law)(**dict(zip((p.name for p in law.parameters), numbers[0], strict=True)), at=law.at)
     plant = lower(Structure(structure.mass, [unit]))
@@ -392,13 +401,14 @@ def _forces(law: AbstractTerm, numbers: np.ndarray, structure: Structure, motion
     width = slots[name].parameters.shape[1]
     padded = np.zeros((len(numbers), 1, width))
     padded[:, 0, : numbers.shape[1]] = numbers
-    return np.asarray(_along_each(plant, name, jnp.asarray(padded), *motion))
+    return np.asarray(_along_each(plant, name, jnp.asarray(padded), *motion, substeps=finer * SUBSTEPS))
 
 
 @eqx.filter_jit
-def _along_each(plant: Plant, name: str, numbers, x, v, time):
+def _along_each(plant: Plant, name: str, numbers, x, v, time, *, substeps: int):
     def one(row):
-        return force_along(eqx.tree_at(lambda p: getattr(p, name).parameters, plant, row), x, v, time)
+        changed = eqx.tree_at(lambda p: getattr(p, name).parameters, plant, row)
+        return force_along(changed, x, v, time, substeps=substeps)
 
     return jax.vmap(one)(numbers)
 

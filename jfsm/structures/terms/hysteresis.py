@@ -10,6 +10,8 @@ from .piecewise_stiffness import beyond
 
 _STIFFNESS = Parameter("k", force=1, length=-1, meaning="stiffness while it sticks")
 _SLIDERS = 16
+_CLOSED = 0.02
+"""What a Bouc-Wen loop loses, as a share of how far it leans, below which it is closed."""
 
 
 def _power(z, n):
@@ -48,6 +50,10 @@ class BoucWen(AbstractTerm):
     def state_rate(self, d, w, z, t):
         bent = _power(z[0], self.n)
         return jnp.stack([w - self.beta * jnp.abs(w) * jnp.sign(z[0]) * bent - self.gamma * w * bent])
+
+    def otherwise(self, stiffness):
+        # Without beta the rate of z is w·(1 - gamma·abs(z)ⁿ): z is a function of the displacement.
+        return "its loop has no width: it remembers nothing" if abs(self.beta) < _CLOSED * abs(self.gamma) else ""
 
     @classmethod
     def shapes(cls, scale):

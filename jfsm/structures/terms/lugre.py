@@ -1,5 +1,7 @@
 """Friction with bristles."""
 
+from itertools import product
+
 import equinox as eqx
 import jax.numpy as jnp
 
@@ -52,17 +54,11 @@ class LuGre(AbstractTerm):
         force, speed = scale.force, scale.speed
         mass = force / (scale.omega**2 * scale.length)
         found = []
-        for ratio in (1.0, 1.5):
-            for share in (0.15, 0.4):
-                for bend in (0.02, 0.05, 0.1):
-                    stiff = force / (bend * scale.length)
-                    found.append(
-                        {
-                            "F": force,
-                            "F_static": ratio * force,
-                            "v_s": share * speed,
-                            "sigma0": stiff,
-                            "sigma1": (stiff * mass) ** 0.5,
-                        }
-                    )
-        return found[: len(found) // 4] + found[len(found) // 2 :]  # with equal limits the Stribeck speed says nothing
+        # Bristles damp as the mass on them would need to; friction of a share of `force` has as much less stiff ones.
+        for ratio, share in ((1.0, 0.15), (1.5, 0.15), (1.5, 0.4)):  # with equal limits the speed says nothing
+            for bend, friction in product((0.02, 0.05, 0.1), (1.0, 0.05)):
+                stiff = force / (bend * scale.length)
+                damping = (stiff * mass / friction) ** 0.5
+                numbers = {"F": force, "F_static": ratio * force, "v_s": share * speed}
+                found.append(numbers | {"sigma0": stiff, "sigma1": damping})
+        return found
