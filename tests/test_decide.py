@@ -176,7 +176,7 @@ def test_of_laws_alike_the_one_whose_shape_is_right_is_named(nats: float, named:
 @pytest.mark.parametrize(("forgiven", "named"), [(False, "stiffness_drift"), (True, "coulomb")])
 def test_where_none_is_right_no_law_of_time_leads(forgiven: bool, named: str):
     tried = [trial(9000.0, 0.004, "coulomb"), trial(9900.0, 0.0005, "stiffness_drift")]
-    tried[1].laws = (SimpleNamespace(timed=True, at=(0, 1), otherwise=lambda stiffness: ""),)
+    tried[1].laws = (SimpleNamespace(timed=True, at=(0, 1), contains=(), otherwise=lambda stiffness: ""),)
     tried[1].structure = SimpleNamespace(terms=(), stiffness_of=lambda at: 1.0)
     decision = decide(GIVEN, REFITTED, tried, lambda t: None, lambda t: Unfit(0.0), periods=100.0, forgiven=forgiven)
     assert decision.verdict == "cause" and decision.winner.effects[0].cause.id == named
@@ -189,6 +189,18 @@ def test_what_the_motion_leaves_untold_is_no_finding(why_not: str, verdict: str)
         GIVEN, REFITTED, [found], lambda t: None, lambda t: Unfit(0.0), periods=100.0, untold=lambda t: why_not
     )
     assert decision.verdict == verdict and decision.why[id(found)] == why_not
+
+
+@pytest.mark.parametrize(("behind", "named"), [(0.5, "coulomb"), (1.5, "coulomb_asymmetric")])
+def test_numbers_that_a_record_does_not_show_are_not_named(behind: float, named: str):
+    general, special = trial(9000.0, 0.0, "coulomb_asymmetric"), trial(9000.0 - behind, 0.0, "coulomb")
+    general.laws, special.laws = (jfsm.CoulombAsymmetric(1.0, 1.1, at=(0, 1)),), (jfsm.Coulomb(1.0, at=(0, 1)),)
+    for t in (general, special):
+        t.structure = SimpleNamespace(stiffness_of=lambda at: 1.0)
+    decision = decide(GIVEN, REFITTED, [general, special], lambda t: None, lambda t: Unfit(0.0), periods=100.0)
+    assert decision.winner.effects[0].cause.id == named and not decision.why[id(decision.winner)]
+    other = special if decision.winner is general else general
+    assert decision.why[id(other)] and decision.share(other) > 0.3
 
 
 @pytest.mark.parametrize(

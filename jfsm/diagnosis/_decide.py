@@ -23,6 +23,8 @@ GATE = 0.5
 """Share of the excess power that a cause explains, at least."""
 SIGNIFICANT = 5.0
 """Nats by which something must beat nothing."""
+_UNSEEN = 1.0
+"""Nats by which a law must beat a special case of it for its further numbers to be seen."""
 SECOND = 15.0
 """Nats by which two effects must beat either of them alone,"""
 _WORTH_A_SECOND = 0.03
@@ -192,6 +194,9 @@ def decide(
     for t in passing:
         if t is not winner:
             why[id(t)] = "explains it too, but is less probable"
+    if special := _special_case(winner, passing):
+        why[id(winner)], why[id(special)] = "is hardly more probable than its special case", ""
+        winner = special
     stands = imposed and bool(winner.effects) and _almost_all(winner, refitted)
     stands |= forgiven and bool(winner.effects) and explained(winner, refitted) >= NEARLY_ALL
     mapped = None if adequate(winner) or stands else stand_in(winner)
@@ -246,6 +251,16 @@ def decide(
 def families(t: Trial) -> list[str]:
     """Families of a trial's causes."""
     return sorted(effect.cause.family for effect in t.effects)
+
+
+def _special_case(winner: Trial, passing: Sequence[Trial]) -> Trial | None:
+    """The special case of the winner's law beside which its further numbers are not seen, if there is one."""
+    if not winner.laws or len(winner.effects) > 1:
+        return None
+    law = winner.laws[0]
+    cases = [t for t in passing if len(t.effects) == 1 and t.laws and t.laws[0].at == law.at]
+    cases = [t for t in cases if isinstance(t.laws[0], law.contains) and winner.evidence - t.evidence < _UNSEEN]
+    return max(cases, key=lambda t: t.evidence, default=None)
 
 
 def _of_right_shape(

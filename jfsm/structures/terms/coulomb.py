@@ -32,6 +32,7 @@ class CoulombAsymmetric(AbstractFriction):
     F_minus: Scalar = eqx.field(converter=as_scalar)
     at: tuple[int, int] = eqx.field(converter=as_link, static=True, kw_only=True)
     kind = "coulomb_asymmetric"
+    contains = (Coulomb,)
     parameters = (
         Parameter("F_plus", force=1, meaning="friction force forward", least=0.0),
         Parameter("F_minus", force=1, meaning="friction force backward", least=0.0),
@@ -65,6 +66,7 @@ class Stribeck(AbstractFriction):
     v_s: Scalar = eqx.field(converter=as_scalar)
     at: tuple[int, int] = eqx.field(converter=as_link, static=True, kw_only=True)
     kind = "stribeck"
+    contains = (Coulomb,)
     parameters = (FORCE, STATIC, SPEED)
 
     def limits(self, d, w, z, t):
