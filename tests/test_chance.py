@@ -8,8 +8,8 @@ import pytest
 
 import jfsm
 from jfsm.demo import DAMPING, FRICTION, MASS, STIFFNESS, hidden_friction
-from jfsm.diagnosis._chance import beside_chance
-from jfsm.diagnosis._decide import NEGLIGIBLE, adequate
+from jfsm.diagnosis._adequacy import NEGLIGIBLE, adequate
+from jfsm.diagnosis._chance import beside_chance, noise_beyond
 from jfsm.diagnosis._search import fit_model
 from jfsm.diagnosis._trial import Trial
 from jfsm.identification import prepare_all
@@ -50,7 +50,7 @@ def test_noise_is_no_excuse_for_a_value_that_is_off(record):
     assert not adequate(drawn)
 
 
-def test_what_white_innovations_tell_of_a_channel_that_gave_but_a_guess_holds_for_all(record):
+def test_white_innovations_tell_the_noise_of_a_channel_that_gave_but_a_guess(record):
     model = jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING) + Coulomb(FRICTION, at=(0, 1))
     records = prepare_all([record], model)
     given, refitted = fit_model(model, records, UNTIL)
@@ -61,6 +61,9 @@ def test_what_white_innovations_tell_of_a_channel_that_gave_but_a_guess_holds_fo
         given, theta=theta, evidence=refitted.evidence + 1, whiteness=0.0, trusted=guessed, noise=np.zeros(3)
     )
     untrusting = [replace(records[0], trusted=guessed)]
-    _, other = beside_chance([best, refitted], model, untrusting, UNTIL, jax.random.key(1))
     more = 8 * float(records[0].floor[1] / records[0].spread[1]) ** 2
-    np.testing.assert_allclose(other.prediction.expected - refitted.prediction.expected, more, rtol=1e-6)
+    np.testing.assert_allclose(noise_beyond([best, refitted], untrusting, UNTIL), more, rtol=1e-6)
+    np.testing.assert_allclose(
+        refitted.amid(np.full(2, more)).prediction.expected - refitted.prediction.expected, more, rtol=1e-6
+    )
+    assert not np.any(noise_beyond([replace(best, whiteness=0.2), refitted], untrusting, UNTIL))

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.diagnosis._decide import decide, settled, something_left
+from jfsm.diagnosis._decide import decide
 from jfsm.diagnosis._effect import Effect
+from jfsm.diagnosis._enough import settled, something_left
 from jfsm.diagnosis._lack_of_fit import Unfit
 from jfsm.diagnosis._trial import Prediction
 from jfsm.identification import Unknown

@@ -16,7 +16,7 @@ from ..dynamics._grid import Fine
 from ..identification import Nuisances, prepare_all
 from ..records import Record
 from ..structures import Clipping, Structure
-from ._decide import adequate, white
+from ._adequacy import adequate, white
 from ._gain import remeasured
 from ._trial import Prediction, Trial, extent, free_run, predict, sets
 
@@ -26,22 +26,15 @@ _DRAWS = 6
 def beside_chance(
     trials: Sequence[Trial], model: Structure, records: Sequence[Nuisances], until: Sequence[int], key: jax.Array
 ) -> list[Trial]:
-    """The trials; the most probable, if its innovations are white and yet it leaves something, with draws of noise.
-
-    Its innovations tell noise of which the channel gave but a guess: all trials are judged beside that.
-    """
-    best = max(trials, key=lambda t: t.evidence)
-    if not white(best):
-        return list(trials)
-    trials = _as_noisy(trials, best, records, until)
+    """The trials; the most probable, if its innovations are white and yet it leaves something, with draws of noise."""
     best = max(trials, key=lambda t: t.evidence)
     limits = any(isinstance(sensor, Clipping) for sensor in model.sensors)
-    if adequate(best) or limits or records[0].path is not None:
-        return trials
+    if adequate(best) or not white(best) or limits or records[0].path is not None:
+        return list(trials)
     posterior = best.posterior(records, until)
     runs = [free_run(posterior, best.theta, index) for index in range(len(records))]
     if not all(np.all(np.isfinite(run)) for run in runs):
-        return trials
+        return list(trials)
     levels = [noise_levels(best, n, index) for index, n in enumerate(records)]
     seeds = np.asarray(jax.random.key_data(key)).astype(np.uint32).tolist()
 
@@ -60,18 +53,20 @@ def beside_chance(
     return [replace(t, prediction=prediction) if t is best else t for t in trials]
 
 
-def _as_noisy(trials: Sequence[Trial], best: Trial, records: Sequence[Nuisances], until: Sequence[int]) -> list[Trial]:
-    """The trials, whose predictions leave as much noise as the best of them found in channels that gave but a guess."""
-    more = []
+def noise_beyond(trials: Sequence[Trial], records: Sequence[Nuisances], until: Sequence[int]) -> np.ndarray:
+    """Power of noise per set, in units as of predictions, beyond that which channels gave but a guess of.
+
+    The innovations of the most probable trial tell it where they are white.
+    """
+    best, more = max(trials, key=lambda t: t.evidence), []
     for index, nuisances in enumerate(records):
         levels = noise_levels(best, nuisances, index)
         found = np.array([levels[channel] for channel in nuisances.channels])
-        beyond = np.where(nuisances.trusted, 0.0, np.maximum(found**2 - nuisances.floor**2, 0.0))
+        guessed = ~nuisances.trusted if white(best) else np.zeros(len(found), dtype=bool)
+        beyond = np.where(guessed, np.maximum(found**2 - nuisances.floor**2, 0.0), 0.0)
         power = float(np.sum(beyond / extent(nuisances) ** 2))
         more += [power] * len(sets(nuisances, until[index]))
-    return [
-        replace(t, prediction=replace(t.prediction, expected=t.prediction.expected + np.array(more))) for t in trials
-    ]
+    return np.array(more)
 
 
 def noise_levels(trial: Trial, nuisances: Nuisances, index: int = 0) -> dict[tuple, float]:

@@ -2,6 +2,7 @@
 
 import secrets
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 
 import jax
@@ -12,13 +13,15 @@ from ..dynamics import Reconstruction
 from ..identification import Nuisances, prepare_all
 from ..records import Record
 from ..structures import AccelerationGain, Cause, ForceGain, Structure
+from ._adequacy import GATE, NEGLIGIBLE, explained, white
 from ._candidates import Candidate, candidates, chosen_causes, contained, promising
-from ._chance import beside_chance, noise_levels
+from ._chance import beside_chance, noise_beyond, noise_levels
 from ._clipped import beside_clipping, limited
-from ._decide import GATE, NEGLIGIBLE, Decision, decide, explained, settled, something_left, strained, white
+from ._decide import Decision, decide
 from ._detectable import also_detectable
 from ._diagnosis import Diagnosis
 from ._effect import Effect
+from ._enough import settled, something_left, strained
 from ._forgiving import forgiving
 from ._gain import Gain, measure_gain
 from ._holdout import split
@@ -108,43 +111,12 @@ def diagnose(
         training, held = split(record, holdout, first=True)
         records, until, given, refitted = _believed(training, model, reconstruction)
     every = candidates(model, records, chosen, places)
-    tried, left_out = promising(every)
-    imposed = records[0].path is not None
-    trials, behind = search(tried, model, given, refitted, records, until, steps.next)
-    close = [t for t in trials if explained(t, refitted) >= GATE]
-    if settled([given, refitted, *trials]):
-        more = contained([law for t in close for law in t.laws], left_out)
-    else:  # of a missing force that is ill seen regression may put the right law last
-        more = [c for c in left_out if c.starts]
-    if more:
-        found = search(more, model, given, refitted, records, until, steps.next)
-        trials, behind = [*trials, *found.trials], [*behind, *found.behind]
-        left_out = [c for c in left_out if c not in more]
-    trials = [t.beside(refitted) for t in trials]
-    given, refitted, *trials = beside_chance([given, refitted, *trials], model, records, until, key)
-    lack = LackOfFit(records, until)
-    effects = _beside([given, refitted, *trials], refitted, every, lack, imposed=imposed) if max_causes > 1 else []
-    if effects:
-        found = search_pairs(effects, trials, model, refitted, records, until, steps.next)
-        together = [t.beside(refitted) for t in found.trials]
-        every_trial, behind = [given, refitted, *trials, *together], behind + found.behind
-        given, refitted, *trials = beside_chance(every_trial, model, records, until, key)
+    found = _searched(every, model, given, refitted, records, until, key, steps.next, pairs=max_causes > 1)
     steps.next("the verdict")
-    periods = sum(n.record.duration / n.period for n in records)
-    mapped = partial(stand_in, records=records, until=until)
-    decision = decide(given, refitted, trials, mapped, lack, periods, imposed=imposed, untold=untold(records))
-    again = None if decision.winner.effects else forgiving([given, refitted, *trials], records, until)
-    if again is not None:
-        best, before = min(t.rung for t in trials), trials
-        records, (given, refitted, *trials) = again
-        compared = {t.effects for t in trials}
-        behind = [*behind, *(LeftBehind(t.effects, t.rung - best) for t in before if t.effects not in compared)]
-        mapped = partial(stand_in, records=records, until=until)
-        lack = LackOfFit(records, until)
-        decision = decide(given, refitted, trials, mapped, lack, periods, forgiven=True)
+    records, found, decision = _decided(found, records, until)
     if clipped:
-        decision = beside_clipping(decision, clipped, refitted)
-    first = records[0]
+        decision = beside_clipping(decision, clipped, found.refitted)
+    first, refitted = records[0], found.refitted
 
     def gained(extended: Structure) -> tuple[Gain | None, list[dict]]:
         if not held:
@@ -168,12 +140,92 @@ def diagnose(
     unseen = []
     if decision.verdict in ("consistent", "undecided"):  # silence is worth what would have been heard
         steps.next("what would have been seen")
-        dropped = {b.effects for b in behind}
-        laws = [c for c in tried if c.effects in dropped and not c.effects[0].cause.is_sensor]
-        unseen = also_detectable(left_out + laws, model, records, until)
-    tested = Tested(trials, behind, left_out, unseen, lack.known)
-    leading = Leading.of(model, [refitted, *trials], decision.share, first, until[0])
+        unseen = also_detectable([*found.left_out, *found.dropped_laws(every)], model, records, until)
+    tested = Tested(found.trials, found.behind, found.left_out, unseen, found.lack.known)
+    leading = Leading.of(model, [refitted, *found.trials], decision.share, first, until[0])
     return assemble(decision, clipped, refitted, tested, model, extended, records, missing, gain, runs, leading)
+
+
+@dataclass(frozen=True)
+class _Searched:
+    """Every trial, the candidates that were not pursued to their tops, and those that were not tried."""
+
+    given: Trial
+    refitted: Trial
+    trials: list[Trial]
+    behind: list[LeftBehind]
+    left_out: list[Candidate]
+    lack: LackOfFit
+
+    @property
+    def every(self) -> list[Trial]:
+        return [self.given, self.refitted, *self.trials]
+
+    def dropped_laws(self, every: Sequence[Candidate]) -> list[Candidate]:
+        """Candidates of laws that were tried, and left behind."""
+        dropped = {b.effects for b in self.behind}
+        return [c for c in every if c.effects in dropped and not c.effects[0].cause.is_sensor]
+
+
+def _searched(
+    every: list[Candidate],
+    model: Structure,
+    given: Trial,
+    refitted: Trial,
+    records: Sequence[Nuisances],
+    until: Sequence[int],
+    key: jax.Array,
+    tell: Callable[[str, int], None],
+    *,
+    pairs: bool,
+) -> _Searched:
+    """Single effects fitted, the promising ones first, and pairs of them where that leaves something."""
+    tried, left_out = promising(every)
+    trials, behind = search(tried, model, given, refitted, records, until, tell)
+    if settled([given, refitted, *trials]):
+        close = [t for t in trials if explained(t, refitted) >= GATE]
+        more = contained([law for t in close for law in t.laws], left_out)
+    else:  # of a missing force that is ill seen regression may put the right law last
+        more = [c for c in left_out if c.starts]
+    if more:
+        found = search(more, model, given, refitted, records, until, tell)
+        trials, behind = [*trials, *found.trials], [*behind, *found.behind]
+        left_out = [c for c in left_out if c not in more]
+    trials = [t.beside(refitted) for t in trials]
+    louder = noise_beyond([given, refitted, *trials], records, until)
+    trials = [t.amid(louder) for t in (given, refitted, *trials)]
+    given, refitted, *trials = beside_chance(trials, model, records, until, key)
+    lack = LackOfFit(records, until)
+    imposed = records[0].path is not None
+    effects = _beside([given, refitted, *trials], refitted, every, lack, imposed=imposed) if pairs else []
+    if effects:
+        found = search_pairs(effects, trials, model, refitted, records, until, tell)
+        trials = [given, refitted, *trials, *(t.beside(refitted).amid(louder) for t in found.trials)]
+        given, refitted, *trials = beside_chance(trials, model, records, until, key)
+        behind = [*behind, *found.behind]
+    return _Searched(given, refitted, trials, behind, left_out, lack)
+
+
+def _decided(
+    found: _Searched, records: list[Nuisances], until: list[int]
+) -> tuple[list[Nuisances], _Searched, Decision]:
+    """The verdict; where no cause is named, that of records of which a share of the force is forgiven to all."""
+    periods = sum(n.record.duration / n.period for n in records)
+
+    def decision_of(found: _Searched, **how) -> Decision:
+        mapped = partial(stand_in, records=records, until=until)
+        return decide(found.given, found.refitted, found.trials, mapped, found.lack, periods, **how)
+
+    decision = decision_of(found, imposed=records[0].path is not None, untold=untold(records))
+    again = None if decision.winner.effects else forgiving(found.every, records, until)
+    if again is None:
+        return records, found, decision
+    records, (given, refitted, *trials) = again
+    compared, best = {t.effects for t in trials}, min(t.rung for t in found.trials)
+    dropped = [LeftBehind(t.effects, t.rung - best) for t in found.trials if t.effects not in compared]
+    lack = LackOfFit(records, until)
+    found = _Searched(given, refitted, trials, [*found.behind, *dropped], found.left_out, lack)
+    return records, found, decision_of(found, forgiven=True)
 
 
 def _believed(

@@ -7,7 +7,7 @@ import numpy as np
 
 from .._threads import side_by_side
 from ..identification import Maximum, Nuisances, settle
-from ._decide import NEARLY_ALL, explained
+from ._adequacy import NEARLY_ALL, explained
 from ._trial import Trial, predict, trial
 
 _SHARES = (0.03, 0.01, 0.003, 0.001)

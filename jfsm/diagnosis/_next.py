@@ -23,8 +23,8 @@ from ..records import Record
 from ..structures import AbstractTerm, Structure
 from ._candidates import hypothesis
 from ._chance import noise_levels
-from ._decide import SIGNIFICANT
 from ._gain import remeasured
+from ._standing import SIGNIFICANT
 from ._trial import Trial
 
 RIVAL = 0.02

@@ -9,11 +9,12 @@ import numpy as np
 
 from ..identification import Nuisances
 from ..structures import PARAMETER_CAUSES, Cause, Clipping, Structure, causes
+from ._adequacy import NEGLIGIBLE
 from ._candidates import Candidate
 from ._class import class_of
 from ._clipped import finding
 from ._course import course
-from ._decide import NEGLIGIBLE, Decision
+from ._decide import Decision
 from ._detectable import Unseen, detectable
 from ._diagnosis import CandidateResult, Diagnosis, Estimate, Finding, Rival
 from ._effect import Effect, names, places

@@ -10,8 +10,8 @@ import numpy as np
 from .._threads import compiled_once, side_by_side
 from ..identification import LADDER, LANES, Maximum, Nuisances, Posterior, approach, finish, lanes_of, rungs
 from ..structures import Structure
+from ._adequacy import GATE, explained
 from ._candidates import Candidate, hypothesis
-from ._decide import GATE, explained
 from ._effect import Effect
 from ._pairs import instead, pairs
 from ._trial import Trial, trial

@@ -125,6 +125,10 @@ class Trial:
         """The same, its prediction judged beside that of a baseline."""
         return replace(self, prediction=self.prediction.beside(baseline.prediction))
 
+    def amid(self, noise: np.ndarray) -> "Trial":
+        """The same, its prediction judged amid so much more noise per set."""
+        return replace(self, prediction=replace(self.prediction, expected=self.prediction.expected + noise))
+
     def interval(self, path: str, width: float = 1.96) -> tuple[float, float, float]:
         """Value, low and high of an unknown; symmetric in its own coordinate."""
         k = next(i for i, u in enumerate(self.unknowns) if u.path == path)

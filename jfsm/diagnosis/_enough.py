@@ -1,0 +1,46 @@
+"""Whether the search has found enough, or what else is worth a try."""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..identification import prior
+from ._adequacy import NEGLIGIBLE, adequate, almost_all
+from ._doubt import UNFIT, UNFIT_SHARE
+from ._lack_of_fit import Unfit
+from ._trial import Trial
+
+WORTH_A_SECOND = 0.03
+"""Share of the refit's error by which two effects must predict better than either of them alone."""
+_STRAINED = 5.0
+"""Nats that own values cost, beside those stated, from which they are hard to believe."""
+
+
+def settled(trials: Sequence[Trial]) -> bool:
+    """Whether the best of them leaves nothing but noise, and its laws are what they are called."""
+    best = max(trials, key=lambda t: t.evidence)
+    return adequate(best) and not any(law.otherwise(best.structure.stiffness_of(law.at)) for law in best.laws)
+
+
+def something_left(
+    trials: Sequence[Trial], refitted: Trial, lack_of_fit: Callable[[Trial], Unfit], *, imposed: bool
+) -> bool:
+    """Whether the best of them leaves enough for a second effect to be worth a search: what a pair has to gain."""
+    best = max(trials, key=lambda t: t.evidence)
+    if adequate(best) or (imposed and almost_all(best, refitted)):
+        return False
+    if best.prediction.left < NEGLIGIBLE:
+        gained = best.evidence - refitted.evidence
+        return bool(best.effects) and lack_of_fit(best).nats > max(UNFIT_SHARE[2] * gained, UNFIT)
+    return bool(np.all(best.prediction.beyond >= WORTH_A_SECOND**2 * refitted.prediction.error))
+
+
+def strained(trials: Sequence[Trial]) -> bool:
+    """Whether the best of them holds only with own values that are hard to believe."""
+    best = max(trials, key=lambda t: t.evidence)
+    cost = 0.0
+    for u, theta in zip(best.unknowns, best.theta, strict=True):
+        if math.isfinite(u.degrees):  # of an own value
+            cost += prior([u], np.array([theta]))[0] - prior([u], np.array([u.center]))[0]
+    return bool(best.effects) and cost > _STRAINED

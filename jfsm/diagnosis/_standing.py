@@ -1,0 +1,86 @@
+"""Why a candidate is no alternative to what is known already, or does not show what makes it more than another."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ._adequacy import GATE, adequate, explained
+from ._enough import WORTH_A_SECOND
+from ._trial import Trial
+
+SIGNIFICANT = 5.0
+"""Nats by which something must beat nothing."""
+_SECOND = 15.0
+"""Nats by which two effects must beat either of them alone."""
+_UNSEEN = 1.0
+"""Nats by which a law must beat a special case of it for its further numbers to be seen."""
+_NEAR = 0.01
+"""Distance to the farthest own value, as a share of it, from which a value is there."""
+
+
+def why_not(t: Trial, tried: Sequence[Trial], given: Trial, refitted: Trial) -> str:
+    """Why a candidate is no alternative to the model and to the others that were `tried`, or nothing."""
+    return _reason(t, given, refitted) or _needs_both(t, tried, refitted)
+
+
+def special_case(winner: Trial, passing: Sequence[Trial]) -> Trial | None:
+    """The special case of the winner's law beside which its further numbers are not seen, if there is one."""
+    if not winner.laws or len(winner.effects) > 1:
+        return None
+    law = winner.laws[0]
+    cases = [t for t in passing if len(t.effects) == 1 and t.laws and t.laws[0].at == law.at]
+    cases = [t for t in cases if isinstance(t.laws[0], law.contains) and winner.evidence - t.evidence < _UNSEEN]
+    return max(cases, key=lambda t: t.evidence, default=None)
+
+
+def _far_off(trial: Trial) -> set[str]:
+    """Own values of a trial that went as far as they may: it is another structure's force that they make up for.
+
+    Damping may go: a model without friction often states as viscous what friction takes.
+    """
+    own = [(u, theta) for u, theta in zip(trial.unknowns, trial.theta, strict=True) if math.isfinite(u.degrees)]
+    low = {u.path for u, theta in own if theta < u.low + _NEAR and not u.path.startswith("damping@")}
+    return low | {u.path for u, theta in own if theta > u.high - _NEAR}
+
+
+def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
+    """Why a candidate is no alternative, or nothing."""
+    over_refit, over_given = explained(t, refitted), explained(t, given)
+    if not math.isfinite(t.evidence) or over_refit == -math.inf:
+        return "its motion runs away"
+    for law in t.laws:
+        if other := law.otherwise(t.structure.stiffness_of(law.at)):
+            return other
+    if far := _far_off(t) - _far_off(refitted):
+        return f"takes {' and '.join(sorted(far))} as far from what the model states as they may be"
+    # A gain error and own values that are all off by the same share predict the same readings: only what is believed
+    # beforehand weighs them, so such a candidate need not beat the refit by a margin, nor leave less.
+    same = not t.laws and adequate(t) and adequate(refitted)
+    better = t.evidence - (given.evidence if same else max(given.evidence, refitted.evidence))
+    if better <= SIGNIFICANT:
+        return f"no more probable than the model {'as given' if same else 'refitted'}"
+    if over_refit >= GATE or (adequate(t) and over_given >= GATE):
+        return ""
+    return f"explains {max(over_refit, 0.0):.0%} of what a refit leaves, less than half"
+
+
+def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
+    """Why a pair is no alternative to one of its effects alone, or to the best single one, or nothing."""
+    if len(t.effects) == 1:
+        return ""
+    singles = [alone for alone in tried if len(alone.effects) == 1]
+    best = max(singles, key=lambda alone: alone.evidence, default=refitted)
+    size = np.sqrt(refitted.prediction.error)
+    for alone in singles:
+        if alone is not best and alone.effects[0] not in t.effects:
+            continue
+        if adequate(t) and adequate(alone) and len(t.laws) < 2:  # own values tell a gain by what is believed of them
+            if t.evidence - alone.evidence <= SIGNIFICANT:
+                return f"{alone.effects[0].label} alone is about as probable"
+            continue
+        gained = np.sqrt(alone.prediction.excess) - np.sqrt(t.prediction.excess)
+        enough = explained(t, alone) >= GATE and bool(np.all(gained >= WORTH_A_SECOND * size))
+        if not enough or t.evidence - alone.evidence <= _SECOND:
+            return f"{alone.effects[0].label} alone explains it about as well"
+    return ""
