@@ -192,6 +192,19 @@ def test_what_the_motion_leaves_untold_is_no_finding(why_not: str, verdict: str)
     assert decision.verdict == verdict and decision.why[id(found)] == why_not
 
 
+@pytest.mark.parametrize(("gained", "verdict"), [(7.0, "parameters"), (14.0, "cause")])
+def test_a_law_is_not_named_only_because_own_values_would_be_far_off_without_it(gained: float, verdict: str):
+    own = Unknown("stiffness@0-1.k", 0.0, 1.0, True, 0.0, 0.02, degrees=1.5, low=-3.9, high=3.9)
+    refitted, found = trial(1000.0, 0.0), trial(1000.0 + gained, 0.0, "sine_stiffness")
+    refitted.unknowns, refitted.theta = (own,), np.array([0.33])  # six nats and a half
+    found.laws, found.structure = (
+        (jfsm.SineStiffness(1.0, 1.0, at=(0, 1)),),
+        SimpleNamespace(stiffness_of=lambda at: 1.0),
+    )
+    decision = decide(GIVEN, refitted, [found], lambda t: None, lambda t: Unfit(0.0), periods=100.0)
+    assert decision.verdict == verdict
+
+
 @pytest.mark.parametrize(("behind", "named"), [(0.5, "coulomb"), (1.5, "coulomb_asymmetric")])
 def test_numbers_that_a_record_does_not_show_are_not_named(behind: float, named: str):
     general, special = trial(9000.0, 0.0, "coulomb_asymmetric"), trial(9000.0 - behind, 0.0, "coulomb")

@@ -39,8 +39,10 @@ def something_left(
 def strained(trials: Sequence[Trial]) -> bool:
     """Whether the best of them holds only with own values that are hard to believe."""
     best = max(trials, key=lambda t: t.evidence)
-    cost = 0.0
-    for u, theta in zip(best.unknowns, best.theta, strict=True):
-        if math.isfinite(u.degrees):  # of an own value
-            cost += prior([u], np.array([theta]))[0] - prior([u], np.array([u.center]))[0]
-    return bool(best.effects) and cost > _STRAINED
+    return bool(best.effects) and strain(best) > _STRAINED
+
+
+def strain(trial: Trial) -> float:
+    """Nats that a trial's own values cost beside those stated."""
+    own = [(u, t) for u, t in zip(trial.unknowns, trial.theta, strict=True) if math.isfinite(u.degrees)]
+    return sum(float(prior([u], np.array([t]))[0] - prior([u], np.array([u.center]))[0]) for u, t in own)

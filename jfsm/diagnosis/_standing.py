@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ._adequacy import GATE, adequate, explained
-from ._enough import WORTH_A_SECOND
+from ._enough import WORTH_A_SECOND, strain
 from ._trial import Trial
 
 SIGNIFICANT = 5.0
@@ -57,7 +57,9 @@ def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
     # A gain error and own values that are all off by the same share predict the same readings: only what is believed
     # beforehand weighs them, so such a candidate need not beat the refit by a margin, nor leave less.
     same = not t.laws and adequate(t) and adequate(refitted)
-    better = t.evidence - (given.evidence if same else max(given.evidence, refitted.evidence))
+    # Of a law and a refit that both leave nothing the readings have to tell, not how far own values may be off.
+    spared = strain(refitted) - strain(t) if t.laws and adequate(t) and adequate(refitted) else 0.0
+    better = t.evidence - (given.evidence if same else max(given.evidence, refitted.evidence + spared))
     if better <= SIGNIFICANT:
         return f"no more probable than the model {'as given' if same else 'refitted'}"
     if over_refit >= GATE or (adequate(t) and over_given >= GATE):
