@@ -43,6 +43,13 @@ def test_the_whole_catalogue_fits_a_chain(shaken):
     assert best.effects[0].at == (1, 2)
 
 
+@pytest.mark.parametrize(("at", "tried"), [(("force", 1), []), (("displacement", 1), [("force", 1)])])
+def test_no_gain_is_looked_for_on_a_channel_that_its_recorder_limited(at, tried, shaken):
+    model = CHAIN + jfsm.Clipping(5.0, at=at)
+    found = [c.effects[0].at for c in candidates(model, [shaken], chosen_causes(["force_gain"]))]
+    assert [spot for spot in found if spot == ("force", 1)] == tried
+
+
 def test_a_stated_offset_is_one_unknown_and_no_own_value(shaken):
     model = CHAIN + jfsm.Offset(0.001, at=("displacement", 2))
     assert not [p for p in own_paths(model, [shaken]) if p.startswith("offset@")]

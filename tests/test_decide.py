@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.diagnosis._decide import decide
+from jfsm.diagnosis._clipped import beside_clipping
+from jfsm.diagnosis._decide import Decision, decide
 from jfsm.diagnosis._effect import Effect
 from jfsm.diagnosis._enough import settled, something_left
 from jfsm.diagnosis._lack_of_fit import Unfit
@@ -246,3 +247,17 @@ def test_own_values_are_not_the_cause_where_other_shapes_would_explain_more(nats
     decision = decide(GIVEN, refitted, [], lambda t: None, lambda t: Unfit(nats), periods=100.0)
     assert decision.verdict == verdict and decision.winner is refitted
     assert (decision.share(refitted) > 0.5) == (verdict == "parameters")
+
+
+@pytest.mark.parametrize(
+    ("verdict", "channel", "then"),
+    [
+        ("consistent", "displacement", "cause"),
+        ("undecided", "displacement", "cause"),
+        ("unnamed", "displacement", "unnamed"),
+        ("unnamed", "force", "cause"),
+    ],
+)
+def test_clipped_channels_are_a_cause_whatever_else_cannot_be_told(verdict: str, channel: str, then: str):
+    decision = Decision(verdict, GIVEN, {}, {}, {})
+    assert beside_clipping(decision, [jfsm.Clipping(1.0, at=(channel, 1))], REFITTED).verdict == then

@@ -32,6 +32,7 @@ from ..structures import (
     AccelerationGain,
     Cause,
     ChannelDelay,
+    Clipping,
     CoulombAsymmetric,
     ForceGain,
     PeriodicDisturbance,
@@ -116,6 +117,8 @@ def candidates(
             channels = ("force",) if imposed else cause.effect.channels
             kinds = [kind for kind in channels if imposed or _shows(cause.effect, kind, records)]
             spots = dict.fromkeys(c for n in records for c in n.record.channels if c[0] in kinds)
+            if cause.effect in (ForceGain, AccelerationGain):  # below its limit noise makes a clipped channel smaller
+                spots = [at for at in spots if not any(isinstance(s, Clipping) and s.at == at for s in model.sensors)]
             sensors += [Candidate((Effect(cause, at),), natural_starts(model, cause, at, records[0])) for at in spots]
         else:
             physical += [Effect(cause, at) for at in _spots(cause, model, places)]

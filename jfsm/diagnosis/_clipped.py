@@ -40,11 +40,13 @@ def limited(records: Sequence[Record], model: Structure) -> list[Clipping]:
 def beside_clipping(decision: Decision, sensors: Sequence[Clipping], refitted: Trial) -> Decision:
     """A decision once channels are known to be clipped.
 
-    A clipped force drives with peaks that are guessed: what they leave is no effect of its own.
+    They are a cause whatever else cannot be told. A clipped force drives with peaks that are guessed: what they leave
+    is no effect of its own.
     """
     if decision.verdict in ("consistent", "parameters"):
         return replace(decision, verdict="cause")
-    if decision.verdict != "cause" and any(sensor.at[0] == "force" for sensor in sensors):
+    guessed = any(sensor.at[0] == "force" for sensor in sensors)
+    if decision.verdict == "undecided" or (decision.verdict == "unnamed" and guessed):
         return replace(decision, verdict="cause", winner=refitted)
     return decision
 
