@@ -9,8 +9,10 @@ import pytest
 import jfsm
 from jfsm.diagnosis._clipped import beside_clipping
 from jfsm.diagnosis._decide import Decision, decide
+from jfsm.diagnosis._diagnose import _speaks_against
 from jfsm.diagnosis._effect import Effect
 from jfsm.diagnosis._enough import settled, something_left
+from jfsm.diagnosis._gain import Gain
 from jfsm.diagnosis._lack_of_fit import Unfit
 from jfsm.diagnosis._trial import Prediction
 from jfsm.identification import Unknown
@@ -261,3 +263,14 @@ def test_own_values_are_not_the_cause_where_other_shapes_would_explain_more(nats
 def test_clipped_channels_are_a_cause_whatever_else_cannot_be_told(verdict: str, channel: str, then: str):
     decision = Decision(verdict, GIVEN, {}, {}, {})
     assert beside_clipping(decision, [jfsm.Clipping(1.0, at=(channel, 1))], REFITTED).verdict == then
+
+
+@pytest.mark.parametrize(
+    ("probability", "left", "after", "named"),
+    [(0.4, 0.002, 0.12, False), (0.6, 0.002, 0.12, True), (0.4, 0.0, 0.12, True), (0.4, 0.002, 0.09, True)],
+)
+def test_an_unlikely_cause_that_leaves_something_and_gains_nothing_is_not_named(probability, left, after, named):
+    winner = trial(9000.0, left, "coulomb")
+    gain = Gain(before=0.1, refitted=0.1, after=after, floor=0.01, channels={}, interval=(-0.5, 0.1))
+    decision = Decision("cause", winner, {id(winner): probability}, {}, {})
+    assert bool(_speaks_against(gain, decision)) != named

@@ -13,7 +13,7 @@ from ..dynamics import Reconstruction
 from ..identification import Nuisances, prepare_all
 from ..records import Record
 from ..structures import AccelerationGain, Cause, ForceGain, Structure
-from ._adequacy import GATE, NEGLIGIBLE, explained, white
+from ._adequacy import GATE, NEGLIGIBLE, adequate, explained, white
 from ._candidates import Candidate, candidates, chosen_causes, contained, promising
 from ._chance import beside_chance, noise_beyond, noise_levels
 from ._clipped import beside_clipping, limited
@@ -246,6 +246,9 @@ def _speaks_against(gain: Gain, decision: Decision) -> str:
     """Why runs on held-out readings speak against what was found, or nothing."""
     if decision.verdict == "cause" and gain.after > _WORSE * max(gain.before, gain.floor):
         return "runs worse on held-out readings than the model as given"
+    unsure = decision.verdict == "cause" and decision.share(decision.winner) < 0.5 and not adequate(decision.winner)
+    if unsure and gain.after > max(gain.before, gain.floor):
+        return "is not likely, leaves something, and runs no better on held-out readings"
     if decision.verdict == "unnamed" and gain.closable and gain.closed < GATE:
         return "closes less than half of the error on held-out readings"
     return ""
