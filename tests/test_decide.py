@@ -75,17 +75,6 @@ def test_no_cause_is_named_that_is_hardly_likelier_than_one_of_another_family_an
     assert 0.4 < decision.share(tried[0]) < 0.55 and 0.2 < decision.share(tried[1]) < 0.4
 
 
-@pytest.mark.parametrize(("alike", "verdict"), [(True, "cause"), (False, "undecided")])
-def test_laws_of_which_none_is_likely_and_which_leave_something_must_be_of_one_class(alike: bool, verdict: str):
-    tried = [trial(9000.0, 0.01, "cubic_hardening"), trial(8990.0, 0.0105, "cubic_softening")]
-    classes = {id(t): ("stiffness" if alike else t.effects[0].cause.id,) for t in tried}
-    decision = decide(
-        GIVEN, trial(1000.0, 0.04), tried, lambda t: None, lambda t: Unfit(0.0), periods=100.0,
-        classes=lambda t: classes[id(t)],
-    )  # fmt: skip
-    assert decision.verdict == verdict
-
-
 @pytest.mark.parametrize(
     ("nats", "left", "verdict"),
     [

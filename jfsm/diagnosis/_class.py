@@ -4,10 +4,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..identification import Nuisances
 from ..structures import AbstractSensor, AbstractTerm, Cause
 from ._shape import bent, growth
-from ._trial import Trial
 
 _POINTS = 41
 """Points along displacement and velocity at which a law is looked at."""
@@ -23,13 +21,6 @@ _GROWING = {
 }
 _EVEN = {"displacement": "asymmetric stiffness", "velocity": "asymmetric damping"}
 _BOTH = "damping that changes with displacement"
-
-
-def classes(t: Trial, nuisances: Nuisances) -> tuple[str, ...]:
-    """The class of each effect of a trial, in words."""
-    peak = nuisances.crest * nuisances.length
-    parts = zip(t.effects, t.parts, strict=True)
-    return tuple(class_of(effect.cause, part, peak, peak * nuisances.omega) for effect, part in parts)
 
 
 def class_of(cause: Cause, part: AbstractTerm | AbstractSensor, peak: float = 1.0, speed: float = 1.0) -> str:

@@ -65,7 +65,6 @@ def decide(
     imposed: bool = False,
     forgiven: bool = False,
     untold: Callable[[Trial], str] = lambda t: "",
-    classes: Callable[[Trial], Sequence[str]] | None = None,
 ) -> Decision:
     """Verdict over the model as given, the model refitted, every candidate, and a map that stands for any law.
 
@@ -74,24 +73,16 @@ def decide(
     Where some force is `forgiven` to all none of them is right: laws of time would explain whatever is left, and a map
     of the little that a law leaves does not speak against it. Along an `imposed` motion a map repeats even the small
     faults of a law, one by one, as often as it repeats itself. What the motion leaves `untold`, and why, is a
-    rival, and no finding. Where no law is likely by itself its family must be, or of laws that leave something their
-    `classes`.
+    rival, and no finding.
     """
-
-    def without_a_name() -> tuple[str, Trial | None]:
-        mapped = stand_in(refitted)
-        stands_in = mapped is not None and explained(mapped, refitted) >= GATE
-        return ("unnamed" if stands_in else "undecided"), mapped
-
     ranked = _Ranked(given, refitted, tried, periods, forgiven)
     winner = ranked.best()
     stands = imposed and bool(winner.effects) and almost_all(winner, refitted)
     stands |= forgiven and bool(winner.effects) and explained(winner, refitted) >= NEARLY_ALL
     mapped = None if adequate(winner) or stands else stand_in(winner)
     verdict = _verdict(given, refitted, winner, mapped)
-    if verdict == "cause" and not ranked.is_sure_of(winner, families if forgiven or not classes else classes):
-        verdict, mapped = without_a_name()
-        winner = refitted if verdict == "unnamed" else winner
+    if verdict == "cause" and not ranked.is_sure_of(winner):
+        verdict = "undecided"
     if verdict == "cause":
 
         def doubt_of(t: Trial) -> float:
@@ -102,8 +93,9 @@ def decide(
         winner, against = ranked.of_right_shape(winner, doubt_of)
         if against := untold(winner) or against:
             ranked.refuse(winner, against)
-            verdict, mapped = without_a_name()
-            winner = refitted if verdict == "unnamed" else winner
+            mapped = stand_in(refitted)
+            stands_in = mapped is not None and explained(mapped, refitted) >= GATE
+            verdict, winner = ("unnamed", refitted) if stands_in else ("undecided", winner)
     if verdict == "parameters":
         unlikely = doubt(winner, winner.evidence - given.evidence, lack_of_fit(winner))
         ranked.make_less_sure([winner], unlikely)
@@ -155,14 +147,13 @@ class _Ranked:
         self.why[id(winner)], self.why[id(special)] = "is hardly more probable than its special case", ""
         return special
 
-    def is_sure_of(self, winner: Trial, classes: Callable[[Trial], Sequence[str]]) -> bool:
-        """Whether a name, or at least its kind, is probable enough to be said."""
-        kind_of = families if adequate(winner) else classes
-        kind = sum(self.chance[id(t)] for t in self.passing if kind_of(t) == kind_of(winner))
+    def is_sure_of(self, winner: Trial) -> bool:
+        """Whether a name, or at least its family, is probable enough to be said."""
+        family = sum(self.chance[id(t)] for t in self._family(winner))
         if not adequate(winner):
             # The rest may be the work of another law than the catalogue's: no name is surer than what it explains.
             self.chance = {which: p * self.kappa[id(winner)] for which, p in self.chance.items()}
-        return self.chance[id(winner)] >= 0.5 or kind >= 0.8
+        return self.chance[id(winner)] >= 0.5 or family >= 0.8
 
     def gained(self, t: Trial, winner: Trial) -> float:
         """Nats by which a trial beats whatever has fewer effects than the winner."""

@@ -16,7 +16,6 @@ from ..structures import AccelerationGain, Cause, ForceGain, Structure
 from ._adequacy import GATE, NEGLIGIBLE, adequate, explained, white
 from ._candidates import Candidate, candidates, chosen_causes, contained, promising
 from ._chance import beside_chance, noise_beyond, noise_levels
-from ._class import classes
 from ._clipped import beside_clipping, limited
 from ._decide import Decision, decide
 from ._detectable import also_detectable
@@ -217,10 +216,7 @@ def _decided(
         mapped = partial(stand_in, records=records, until=until)
         return decide(found.given, found.refitted, found.trials, mapped, found.lack, periods, **how)
 
-    def kinds(t: Trial) -> tuple[str, ...]:
-        return classes(t, records[0])
-
-    decision = decision_of(found, imposed=records[0].path is not None, untold=untold(records), classes=kinds)
+    decision = decision_of(found, imposed=records[0].path is not None, untold=untold(records))
     again = None if decision.winner.effects else forgiving(found.every, records, until)
     if again is None:
         return records, found, decision

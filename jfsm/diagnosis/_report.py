@@ -11,7 +11,7 @@ from ..identification import Nuisances
 from ..structures import PARAMETER_CAUSES, Cause, Clipping, Structure, causes
 from ._adequacy import NEGLIGIBLE
 from ._candidates import Candidate
-from ._class import classes
+from ._class import class_of
 from ._clipped import finding
 from ._course import course
 from ._decide import Decision
@@ -167,7 +167,12 @@ def _finding(which: int, decision: Decision, trials: list[Trial], model: Structu
     """One effect of the winner; its rivals are what it may be instead, the winner's other effects aside."""
     winner = decision.winner
     effect = winner.effects[which]
-    kind, probability, alike, instead = classes(winner, nuisances)[which], 0.0, 0.0, dict[Effect, float]()
+    peak = nuisances.crest * nuisances.length
+
+    def kind_of(t: Trial, which: int) -> str:
+        return class_of(t.effects[which].cause, t.parts[which], peak, peak * nuisances.omega)
+
+    kind, probability, alike, instead = kind_of(winner, which), 0.0, 0.0, dict[Effect, float]()
     for t in trials:
         rest = set(t.effects) - set(winner.effects)
         if effect in t.effects:
@@ -175,11 +180,7 @@ def _finding(which: int, decision: Decision, trials: list[Trial], model: Structu
         elif len(rest) == 1:
             rival = rest.pop()
             instead[rival] = instead.get(rival, 0.0) + decision.share(t)
-            if (
-                decision.share(t) > 0
-                and rival.at == effect.at
-                and classes(t, nuisances)[t.effects.index(rival)] == kind
-            ):
+            if decision.share(t) > 0 and rival.at == effect.at and kind_of(t, t.effects.index(rival)) == kind:
                 alike += decision.share(t)
     ranked = sorted(instead.items(), key=lambda item: -item[1])
     rivals = tuple(Rival(r.cause.id, r.at, share) for r, share in ranked if share > RIVAL)
