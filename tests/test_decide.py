@@ -266,11 +266,11 @@ def test_clipped_channels_are_a_cause_whatever_else_cannot_be_told(verdict: str,
 
 
 @pytest.mark.parametrize(
-    ("probability", "left", "after", "named"),
-    [(0.4, 0.002, 0.12, False), (0.6, 0.002, 0.12, True), (0.4, 0.0, 0.12, True), (0.4, 0.002, 0.09, True)],
+    ("probability", "left", "low", "named"),
+    [(0.4, 0.002, -0.1, False), (0.6, 0.002, -0.1, True), (0.4, 0.0, -0.1, True), (0.4, 0.002, 0.2, True)],
 )
-def test_an_unlikely_cause_that_leaves_something_and_gains_nothing_is_not_named(probability, left, after, named):
+def test_an_unlikely_cause_that_leaves_something_must_be_confirmed_by_held_out_readings(probability, left, low, named):
     winner = trial(9000.0, left, "coulomb")
-    gain = Gain(before=0.1, refitted=0.1, after=after, floor=0.01, channels={}, interval=(-0.5, 0.1))
+    gain = Gain(before=0.1, refitted=0.1, after=0.08, floor=0.01, channels={}, interval=(low, 0.6))
     decision = Decision("cause", winner, {id(winner): probability}, {}, {})
     assert bool(_speaks_against(gain, decision)) != named

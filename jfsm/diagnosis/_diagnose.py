@@ -247,8 +247,8 @@ def _speaks_against(gain: Gain, decision: Decision) -> str:
     if decision.verdict == "cause" and gain.after > _WORSE * max(gain.before, gain.floor):
         return "runs worse on held-out readings than the model as given"
     unsure = decision.verdict == "cause" and decision.share(decision.winner) < 0.5 and not adequate(decision.winner)
-    if unsure and gain.after > max(gain.before, gain.floor):
-        return "is not likely, leaves something, and runs no better on held-out readings"
+    if unsure and not (gain.closable and gain.significant):
+        return "is not likely, leaves something, and is not confirmed by held-out readings"
     if decision.verdict == "unnamed" and gain.closable and gain.closed < GATE:
         return "closes less than half of the error on held-out readings"
     return ""
