@@ -146,6 +146,17 @@ def test_two_lanes_are_what_each_of_them_is_alone(chain_nuisances, smooth):
             np.testing.assert_allclose(part[lane], expected[0], rtol=1e-9, atol=1e-9 * np.max(np.abs(expected)))
 
 
+def test_delays_that_begin_far_apart_run_side_by_side(single_nuisances):
+    short, long = (
+        hypothesis(SINGLE, jfsm.DelayedForce(1.0, tau, at=(0, 1)), single_nuisances) for tau in (0.3, 100 * DT)
+    )
+    both = Posterior(together(short, long), [single_nuisances])
+    values = both.evaluate(both.initial())[0]
+    for lane, one in enumerate((short, long)):
+        alone = Posterior(one, [single_nuisances])
+        assert values[lane] == pytest.approx(alone.evaluate(alone.initial())[0][0], rel=1e-9)
+
+
 def test_more_starts_than_lanes_are_refused(chain_nuisances, smooth):
     with pytest.raises(ValueError, match=r"At most 2 starts fit into one call; got 5\."):
         Posterior(together(*[smooth.hypothesis] * 5), [chain_nuisances])

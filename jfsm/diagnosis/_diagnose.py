@@ -182,7 +182,7 @@ def _searched(
     """Single effects fitted, the promising ones first, and pairs of them where that leaves something."""
     tried, left_out = promising(every)
     trials, behind = search(tried, model, given, refitted, records, until, tell)
-    if settled([given, refitted, *trials]):
+    if settled([given, refitted, *trials], refitted):
         close = [t for t in trials if explained(t, refitted) >= GATE]
         more = contained([law for t in close for law in t.laws], left_out)
     else:  # of a missing force that is ill seen regression may put the right law last

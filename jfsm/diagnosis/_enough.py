@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..identification import prior
-from ._adequacy import NEGLIGIBLE, adequate, almost_all
+from ._adequacy import NEARLY_ALL, NEGLIGIBLE, adequate, almost_all, explained
 from ._doubt import UNFIT, UNFIT_SHARE
 from ._lack_of_fit import Unfit
 from ._trial import Trial
@@ -17,10 +17,16 @@ _STRAINED = 5.0
 """Nats that own values cost, beside those stated, from which they are hard to believe."""
 
 
-def settled(trials: Sequence[Trial]) -> bool:
-    """Whether the best of them leaves nothing but noise, and its laws are what they are called."""
+def settled(trials: Sequence[Trial], refitted: Trial) -> bool:
+    """Whether the best of them leaves nothing but noise, or one explains nearly all; its laws what they are called."""
     best = max(trials, key=lambda t: t.evidence)
-    return adequate(best) and not any(law.otherwise(best.structure.stiffness_of(law.at)) for law in best.laws)
+    return (adequate(best) and _is_itself(best)) or any(
+        explained(t, refitted) >= NEARLY_ALL and _is_itself(t) for t in trials if t.effects
+    )
+
+
+def _is_itself(t: Trial) -> bool:
+    return not any(law.otherwise(t.structure.stiffness_of(law.at)) for law in t.laws)
 
 
 def something_left(

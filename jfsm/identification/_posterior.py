@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax
 import jax.numpy as jnp
@@ -188,6 +188,8 @@ class Posterior:
         grid = Grid(float(nuisances.record.dt), nuisances.fine.substeps)
         slots = {"smooth_slots": _slot_bucket(structures[0]), "grid": grid, "rolled": True}
         plants = [numbers_of(s, nuisances.channels, **slots) for s in structures]
+        reach = max(plant.reach for plant in plants)  # of delays that begin far apart
+        plants = [replace(plant, reach=reach) for plant in plants]
         packed = {}
         for lane in set(self._pick):
             mine_of = [self.hypothesis.unknowns[lane][k] for k in mine]
