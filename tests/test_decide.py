@@ -276,3 +276,11 @@ def test_an_unlikely_cause_that_leaves_something_must_be_confirmed_by_held_out_r
     gain = Gain(before=0.1, refitted=0.1, after=0.08, floor=0.01, channels={}, interval=(low, 0.6))
     decision = Decision("cause", winner, {id(winner): probability}, {}, {})
     assert bool(_speaks_against(gain, decision)) != named
+
+
+@pytest.mark.parametrize(("behind", "verdict"), [(4.0, "parameters"), (0.5, "undecided")])
+def test_own_values_are_not_the_cause_where_something_else_is_as_likely(behind: float, verdict: str):
+    refitted = trial(10_000.0, 0.0)
+    rivals = [trial(10_000.0 - behind, 0.0, cause) for cause in ("force_gain", "accel_gain")]
+    decision = decide(GIVEN, refitted, rivals, lambda t: None, lambda t: Unfit(0.0), periods=100.0)
+    assert decision.verdict == verdict

@@ -100,7 +100,9 @@ def decide(
         unlikely = doubt(winner, winner.evidence - given.evidence, lack_of_fit(winner))
         ranked.make_less_sure([winner], unlikely)
         if unlikely > 1.0:
-            ranked.chance[id(winner)], verdict = 0.0, "undecided"
+            ranked.chance[id(winner)] = 0.0
+        if ranked.chance[id(winner)] < 0.5:
+            verdict = "undecided"
     if verdict == "consistent" and white(refitted) and lack_of_fit(refitted).nats > 2 * UNFIT:
         verdict = "undecided"  # no cause is likelier, and yet it is not noise alone
     if verdict == "consistent":
