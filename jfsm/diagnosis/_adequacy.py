@@ -8,6 +8,8 @@ from ._trial import Trial
 
 GATE = 0.5
 """Share of the excess power that a cause explains, at least."""
+SIGNIFICANT = 5.0
+"""Nats by which something must beat nothing."""
 NEGLIGIBLE = 0.02
 """Excess, as a share of the signal, below which nothing but a perfect explanation is a finding."""
 NEARLY_ALL, MUCH = 0.8, 0.1

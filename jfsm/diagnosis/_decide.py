@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..structures import AbstractTerm
-from ._adequacy import GATE, MUCH, NEARLY_ALL, NEGLIGIBLE, adequate, almost_all, explained, white
+from ._adequacy import GATE, MUCH, NEARLY_ALL, NEGLIGIBLE, SIGNIFICANT, adequate, almost_all, explained, white
 from ._doubt import UNFIT, doubt
 from ._lack_of_fit import Unfit
-from ._standing import SIGNIFICANT, special_case, why_not
+from ._standing import special_case, why_not
 from ._trial import Trial
 
 _NOT_RIGHT = "explains much of it, but is not of the right shape"

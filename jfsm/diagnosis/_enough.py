@@ -1,20 +1,17 @@
 """Whether the search has found enough, or what else is worth a try."""
 
-import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from ..identification import prior
-from ._adequacy import NEARLY_ALL, NEGLIGIBLE, adequate, almost_all, explained
+from ._adequacy import NEARLY_ALL, NEGLIGIBLE, SIGNIFICANT, adequate, almost_all, explained
 from ._doubt import UNFIT, UNFIT_SHARE
 from ._lack_of_fit import Unfit
-from ._trial import Trial
+from ._trial import Trial, own_values
 
 WORTH_A_SECOND = 0.03
 """Share of the refit's error by which two effects must predict better than either of them alone."""
-_STRAINED = 5.0
-"""Nats that own values cost, beside those stated, from which they are hard to believe."""
 
 
 def settled(trials: Sequence[Trial], refitted: Trial) -> bool:
@@ -45,10 +42,10 @@ def something_left(
 def strained(trials: Sequence[Trial]) -> bool:
     """Whether the best of them holds only with own values that are hard to believe."""
     best = max(trials, key=lambda t: t.evidence)
-    return bool(best.effects) and strain(best) > _STRAINED
+    return bool(best.effects) and strain(best) > SIGNIFICANT
 
 
 def strain(trial: Trial) -> float:
     """Nats that a trial's own values cost beside those stated."""
-    own = [(u, t) for u, t in zip(trial.unknowns, trial.theta, strict=True) if math.isfinite(u.degrees)]
-    return sum(float(prior([u], np.array([t]))[0] - prior([u], np.array([u.center]))[0]) for u, t in own)
+    costs = (prior([u], np.array([t]))[0] - prior([u], np.array([u.center]))[0] for u, t in own_values(trial))
+    return float(sum(costs))

@@ -21,10 +21,10 @@ from ..dynamics import simulate
 from ..identification import LADDER, Nuisances, Posterior, approach, finish, lanes_of, prepare
 from ..records import Record
 from ..structures import AbstractTerm, Structure
+from ._adequacy import SIGNIFICANT
 from ._candidates import hypothesis
 from ._chance import noise_levels
 from ._gain import remeasured
-from ._standing import SIGNIFICANT
 from ._trial import Trial
 
 RIVAL = 0.02

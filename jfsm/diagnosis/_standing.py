@@ -5,12 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ._adequacy import GATE, adequate, explained
+from ._adequacy import GATE, SIGNIFICANT, adequate, explained
 from ._enough import WORTH_A_SECOND, strain
-from ._trial import Trial
+from ._trial import Trial, own_values
 
-SIGNIFICANT = 5.0
-"""Nats by which something must beat nothing."""
 _SECOND = 15.0
 """Nats by which two effects must beat either of them alone."""
 _UNSEEN = 1.0
@@ -39,7 +37,7 @@ def _far_off(trial: Trial) -> set[str]:
 
     Damping may go: a model without friction often states as viscous what friction takes.
     """
-    own = [(u, theta) for u, theta in zip(trial.unknowns, trial.theta, strict=True) if math.isfinite(u.degrees)]
+    own = own_values(trial)
     low = {u.path for u, theta in own if theta < u.low + _NEAR and not u.path.startswith("damping@")}
     return low | {u.path for u, theta in own if theta > u.high - _NEAR}
 

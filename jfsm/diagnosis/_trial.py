@@ -137,6 +137,11 @@ class Trial:
         return u.value(t), ends[0], ends[1]
 
 
+def own_values(t: Trial) -> list[tuple[Unknown, float]]:
+    """The model's own values among a trial's unknowns, and where they ended."""
+    return [(u, float(theta)) for u, theta in zip(t.unknowns, t.theta, strict=True) if math.isfinite(u.degrees)]
+
+
 def sets(nuisances: Nuisances, until: int) -> list[np.ndarray]:
     """Sample masks of the sets on which a record is judged: training and held out, or contiguous quarters."""
     n = nuisances.samples
