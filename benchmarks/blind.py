@@ -16,6 +16,7 @@ import multiprocessing
 import os
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -31,6 +32,8 @@ from tests.blind.dirt import TAKEN_FOR  # noqa: E402
 from tests.blind.drives import DRIVES  # noqa: E402
 
 HOLDOUT = 0.3
+ROWS_PER_PROCESS = 40
+"""After which a process makes room for a new one: the programs that it holds grow to gigabytes."""
 ONE_CORE = {
     "JAX_PLATFORMS": "cpu",
     "JAX_ENABLE_X64": "1",
@@ -155,13 +158,27 @@ def answers(seeds: Sequence[int], drawing: Drawing, jobs: int) -> Iterator[Row]:
     os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(Path(tempfile.gettempdir()) / "jfsm-blind-programs"))
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.2")
     context = multiprocessing.get_context("spawn")
-    pool = concurrent.futures.ProcessPoolExecutor(jobs, mp_context=context)
+    pool = concurrent.futures.ProcessPoolExecutor(
+        jobs, mp_context=context, initializer=_end_with_parent, max_tasks_per_child=ROWS_PER_PROCESS
+    )
     try:
         waiting = [pool.submit(examine, seed, drawing) for seed in seeds]
         for future in concurrent.futures.as_completed(waiting):
             yield future.result()
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _end_with_parent() -> None:
+    """Lets a process of the pool end when the one that began it does, however that ends."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def progress_line(row: Row, done: int, total: int, elapsed: float) -> str:
