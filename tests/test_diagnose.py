@@ -276,6 +276,17 @@ def test_a_spring_is_told_beside_a_gain_error_of_the_force(believed):
     assert gain.parameters["eps"].value == pytest.approx(0.15, abs=0.03)
 
 
+@pytest.mark.parametrize(("fault", "load", "bias"), [("accel_bias", 0.0, 0.5), ("preload", 0.5, 0.0)])
+def test_a_spring_is_told_beside_an_offset_that_is_not_slight(believed, fault: str, load: float, bias: float):
+    record = made(lambda x, v: duffing(x, v) - load, channels=("displacement", "acceleration"))
+    read = {kind: y + (bias if kind == "acceleration" else 0.0) for (kind, _), y in record.channels.items()}
+    again = jfsm.Record(record.time, **read, at_rest=True)  # pyright: ignore[reportArgumentType]
+    d = jfsm.diagnose(again, believed, causes=["cubic_hardening", fault], key=jax.random.key(0))
+    assert {f.cause for f in d.findings} == {"cubic_hardening", fault}
+    [offset] = next(f for f in d.findings if f.cause == fault).parameters.values()
+    assert offset.value == pytest.approx(0.5, abs=0.05)
+
+
 def test_no_second_effect_is_looked_for_where_one_is_asked_for_and_what_is_left_is_said(believed, two_hidden):
     d = jfsm.diagnose(made(two_laws), believed, causes=FEW, max_causes=1, key=jax.random.key(0))
     assert len(d.findings) < 2

@@ -12,7 +12,7 @@ from .._types import require_x64
 from ..dynamics import Reconstruction
 from ..identification import Nuisances, prepare_all
 from ..records import Record
-from ..structures import AccelerationGain, Cause, ForceGain, Structure
+from ..structures import Cause, Structure
 from ._adequacy import GATE, NEGLIGIBLE, adequate, explained, white
 from ._candidates import Candidate, candidates, chosen_causes, contained, promising
 from ._chance import beside_chance, noise_beyond, noise_levels
@@ -21,7 +21,7 @@ from ._decide import Decision, decide
 from ._detectable import also_detectable
 from ._diagnosis import Diagnosis
 from ._effect import Effect
-from ._enough import settled, something_left, strained
+from ._enough import hidden, settled, something_left
 from ._forgiving import forgiving
 from ._gain import Gain, measure_gain
 from ._holdout import split
@@ -267,8 +267,7 @@ def _beside(
     effects = [effect for candidate in every for effect in candidate.effects]
     if something_left(alone, refitted, lack, imposed=imposed):
         return effects
-    # A gain may hide in own values.
-    return [e for e in effects if e.cause.effect in (ForceGain, AccelerationGain)] if strained(alone) else []
+    return [e for e in effects if e.cause.effect in hidden(alone)]
 
 
 def _outweighed(model: Structure, refitted: Structure) -> bool:

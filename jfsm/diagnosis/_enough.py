@@ -4,7 +4,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..identification import prior
+from ..identification import Unknown, prior
+from ..structures import AccelerationBias, AccelerationGain, ForceGain, Preload
 from ._adequacy import NEARLY_ALL, NEGLIGIBLE, SIGNIFICANT, adequate, almost_all, explained
 from ._doubt import UNFIT, UNFIT_SHARE
 from ._lack_of_fit import Unfit
@@ -39,13 +40,27 @@ def something_left(
     return bool(np.all(best.prediction.beyond >= WORTH_A_SECOND**2 * refitted.prediction.error))
 
 
-def strained(trials: Sequence[Trial]) -> bool:
-    """Whether the best of them holds only with own values that are hard to believe."""
+def hidden(trials: Sequence[Trial]) -> tuple[type, ...]:
+    """What may hide in own values or offsets of the best of them, which holds only with such as are hard to believe."""
     best = max(trials, key=lambda t: t.evidence)
-    return bool(best.effects) and strain(best) > SIGNIFICANT
+    if not best.effects:
+        return ()
+    found: list[type] = [ForceGain, AccelerationGain] if strain(best) > SIGNIFICANT else []
+    for kind, effect in (("force", Preload), ("acceleration", AccelerationBias)):
+        offsets = [(u, theta) for u, theta in _valued(best) if u.path.startswith(f"offset@{kind}-")]
+        found += [effect] if _cost(offsets) > SIGNIFICANT else []
+    return tuple(found)
 
 
 def strain(trial: Trial) -> float:
     """Nats that a trial's own values cost beside those stated."""
-    costs = (prior([u], np.array([t]))[0] - prior([u], np.array([u.center]))[0] for u, t in own_values(trial))
-    return float(sum(costs))
+    return _cost(own_values(trial))
+
+
+def _valued(trial: Trial) -> list[tuple[Unknown, float]]:
+    return [(u, float(theta)) for u, theta in zip(trial.unknowns, trial.theta, strict=True)]
+
+
+def _cost(values: Sequence[tuple[Unknown, float]]) -> float:
+    """Nats by which values are less probable beforehand than what is believed of them."""
+    return float(sum(prior([u], np.array([t]))[0] - prior([u], np.array([u.center]))[0] for u, t in values))

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..structures import Preload
 from ._adequacy import GATE, SIGNIFICANT, adequate, explained
 from ._enough import WORTH_A_SECOND, strain
 from ._trial import Trial, own_values
@@ -65,6 +66,11 @@ def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
     return f"explains {max(over_refit, 0.0):.0%} of what a refit leaves, less than half"
 
 
+def _hides_one(t: Trial) -> bool:
+    """Whether all but one of its effects may hide in own values and offsets: what is believed of these tells them."""
+    return sum(not isinstance(law, Preload) for law in t.laws) < 2
+
+
 def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
     """Why a pair is no alternative to one of its effects alone, or to the best single one, or nothing."""
     if len(t.effects) == 1:
@@ -75,7 +81,7 @@ def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
     for alone in singles:
         if alone is not best and alone.effects[0] not in t.effects:
             continue
-        if adequate(t) and adequate(alone) and len(t.laws) < 2:  # own values tell a gain by what is believed of them
+        if adequate(t) and adequate(alone) and _hides_one(t):
             if t.evidence - alone.evidence <= SIGNIFICANT:
                 return f"{alone.effects[0].label} alone is about as probable"
             continue

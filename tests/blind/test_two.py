@@ -24,6 +24,7 @@ DRAWN: dict[Pair, tuple[str, str]] = {  # pair -> excitation, channels
     ("quadratic_damping", "stiffness_drift"): ("multisine", "xva"),
     ("bilinear_stiffness", "force_gain"): ("sweep", "xva"),
     ("coulomb", "accel_bias"): ("free_decay", "xva"),
+    ("cubic_damping", "accel_gain"): ("multisine", "xva"),
     ("coulomb", "force_delay"): ("sweep", "x"),
 }
 WITH_SENSOR = [pair for pair in DRAWN if pair[1] in SENSORS]
@@ -120,9 +121,11 @@ def test_beside_a_law_one_channel_is_misread_and_the_others_are_the_truth(pair: 
     challenge = drawn(pair)
     assert challenge.beside is not None and not isinstance(challenge.law, Both)
     (kind, _), p, truth = challenge.beside.at, challenge.beside.parameters, truth_of(challenge)
+    assert challenge.beside.cause == pair[1]
     expected = {
         "force_gain": lambda: (1.0 + p["eps"]) * truth["force"],
         "accel_bias": lambda: truth["acceleration"] + p["b"],
+        "accel_gain": lambda: (1.0 + p["eps"]) * truth["acceleration"],
         "force_delay": lambda: challenge.drive(challenge.time - p["tau"]),
     }[challenge.beside.cause]()
     np.testing.assert_allclose(challenge.clean[str(kind)], expected, rtol=1e-12)

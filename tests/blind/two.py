@@ -94,7 +94,8 @@ class _Question:
         ]
         if self.sensor is None:
             return effects
-        cause = next(c for c, (kind, _) in SENSORS.items() if kind is type(self.sensor))
+        known = SENSORS.items()
+        cause = next(c for c, (kind, at) in known if kind is type(self.sensor) and self.sensor.channel in at)
         return [*effects, Effect(cause, self.sensor.at, self.sensor.parameters, 0.0, 0.0)]
 
 
