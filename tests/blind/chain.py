@@ -375,7 +375,7 @@ class _View:
 
 
 def left_beside(y: FloatArray, basis: FloatArray) -> FloatArray:
-    """What no combination of the columns of `basis` (n, columns) is of y (n,)."""
+    """What no combination of the columns of `basis` (n, columns) is of each column of y (n, others)."""
     columns = basis / np.maximum(np.sqrt(np.mean(basis**2, axis=0)), np.finfo(float).tiny)
     return y - columns @ np.linalg.lstsq(columns, y, rcond=1e-10)[0]
 
@@ -678,7 +678,7 @@ def _seen(bench: _Bench, at: Link, motion: ChainMotion, cause: str) -> float:
     view = bench.view(motion)
     own = view.of(list(view.values().values()))
     beside = np.concatenate([own, view.nuisances(starts=cause not in NEEDS_REST)], axis=1)
-    return rms(left_beside(view.of([np.outer(motion.link.effect, across(at))])[:, 0], beside))
+    return rms(left_beside(view.of([np.outer(motion.link.effect, across(at))]), beside))
 
 
 def _value_is_seen(bench: _Bench, motion: ChainMotion, model: Chain, cause: str, place: Any) -> bool:
@@ -687,10 +687,10 @@ def _value_is_seen(bench: _Bench, motion: ChainMotion, model: Chain, cause: str,
     beside, values = view.nuisances(), view.values()
     wrong = _value(model, cause, place)
     off = sum(wrong.values()) - sum(_value(bench.chain, cause, place).values())
-    shown = left_beside(view.of([off * values.pop((cause, place))])[:, 0], beside)
-    others = view.of(list(values.values())).T
-    alike = [np.concatenate([other[:, None], beside], axis=1) for other in others]
-    return rms(shown) >= LEAST_SEEN and all(rms(left_beside(shown, y)) >= LEAST_OWN * rms(shown) for y in alike)
+    shown = left_beside(view.of([off * values.pop((cause, place))]), beside)[:, 0]
+    others = left_beside(view.of(list(values.values())), beside)
+    own = shown[:, None] - others * (shown @ others) / np.sum(others**2, axis=0)
+    return rms(shown) >= LEAST_SEEN and bool(np.all(np.mean(own**2, axis=0) >= (LEAST_OWN * rms(shown)) ** 2))
 
 
 # beliefs and sensors
