@@ -189,15 +189,14 @@ class _ChainRun(Run):
         drive, force, hidden_rates, loads, m = (
             self.drive, self.law.force, self.law.hidden_rates, self.plant.loads, self.plant.mass,
         )  # fmt: skip
-        past, delay, held = self.past, self.law.delay, self.law.holds(mode)
+        past, delay = self.past, self.law.delay
 
         def rates(t: float, y: FloatArray) -> Sequence[float]:
             d, w, q, r, *z = y.tolist()
             if delay:
                 z.append(past(t - delay))
             load, aside = loads(float(drive(t)), d, w, q, r)
-            acceleration = 0.0 if held else (load - force(d, w, z, t, load, mode)) / m
-            return w, acceleration, r, aside, *hidden_rates(d, w, z, mode)
+            return w, (load - force(d, w, z, t, load, mode)) / m, r, aside, *hidden_rates(d, w, z, mode)
 
         return rates
 

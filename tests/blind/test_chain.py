@@ -66,8 +66,9 @@ MORE_FORCES = FORCES | {
 
 
 @functools.cache
-def drawn(cause: str, seed: int = 1) -> ChainChallenge:
+def drawn(cause: str) -> ChainChallenge:
     excitation, channels = (DRAWN | MISREAD)[cause]
+    seed = 10 if cause == "coulomb" else 1  # with friction that sticks again and again
     return draw_chain(seed, causes=cause, noise=0.01, excitation=excitation, channels=channels)
 
 
@@ -168,6 +169,7 @@ def test_the_motion_is_that_of_the_chain_under_all_forces(cause: str):
     np.testing.assert_allclose(missing, on_masses(at, motion.link.effect), atol=1e-9 * np.abs(linear).max())
     if cause == "coulomb":
         sticks = motion.link.v == 0.0
+        assert 30 < np.sum(sticks[:300]) < 270
         np.testing.assert_allclose(motion.link.effect[~sticks], p["F"] * np.sign(w[~sticks]), rtol=1e-9)
         assert np.abs(motion.link.effect).max() <= p["F"] * (1.0 + 1e-9)
     else:
