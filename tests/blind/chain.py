@@ -30,6 +30,7 @@ from .laws import LAWS, Law, NoLaw, Scene
 from .laws.base import Mode, log_uniform
 from .plants import EscapeError, Motion, Plant
 from .sensors import DELAYS, RESPONSES, SENSORS, UNITS, Sensor, with_noise
+from .two import SHARES
 
 Link: TypeAlias = tuple[int, int]
 Place: TypeAlias = tuple[str, int]  # kind of channel, mass
@@ -47,7 +48,6 @@ CHAIN_SETS: dict[str, tuple[tuple[str, ...], bool, str]] = {
 }
 HANGS = ("attached_oscillator", "preload", "periodic_disturbance")  # on a mass, whether or not a link holds it
 REST: ChainState = ((0.0, 0.0), (0.0, 0.0))
-LARGEST = 0.35  # share of the link's force
 RATIOS = (1.5, 3.0)  # of the two natural frequencies
 THIRD_LINKS = 0.3  # how many chains have one
 # What of an effect no own values, start and offsets take up in the channels, in their rms: a fifth of the loudest
@@ -630,7 +630,7 @@ def _drawn_law(rng: np.random.Generator, cause: str, bench: _Bench, at: Link) ->
     chain, driven, drive, time, kind = bench.chain, bench.driven, bench.drive, bench.time, LAWS[cause]
     plain, around = sketch(chain, at, NoLaw(), driven, drive, bench.start, time).link, chain.around(at)
     limit, scale = FARTHEST * plain.peak, rms(plain.x)
-    shares = (kind.shares[0], min(kind.shares[1], LARGEST)) if kind.sized else kind.shares
+    shares = (max(SHARES[0], kind.shares[0]), min(SHARES[1], kind.shares[1])) if kind.sized else kind.shares
     law = sized(
         rng, kind, Scene(around, drive, plain), shares,
         lambda law: sketch(chain, at, law, driven, drive, bench.start, time, limit).link,

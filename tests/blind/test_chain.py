@@ -15,7 +15,6 @@ from . import chain as chain_module
 from .arrays import FloatArray, rms
 from .chain import (
     HANGS,
-    LARGEST,
     LEAST_SEEN,
     RATIOS,
     REST,
@@ -37,6 +36,7 @@ from .laws.stiffness import DoubleWell
 from .plants import EscapeError
 from .sensors import SENSORS
 from .test_laws import FORCES, RATES
+from .two import SHARES
 
 DRAWN = {  # cause -> excitation, channels
     "cubic_hardening": ("multisine", "xva"),
@@ -152,7 +152,7 @@ def test_a_law_is_at_a_link_or_on_a_mass_and_of_the_promised_size(cause: str):
     basis = np.stack([d / rms(d), w / rms(w)], axis=1)
     left = effect - basis @ np.linalg.lstsq(basis, effect, rcond=None)[0]
     assert (rms(effect) / rms(link), rms(left) / rms(link)) == pytest.approx((challenge.share, challenge.left))
-    assert LAWS[cause].shares[0] <= challenge.share <= LARGEST and challenge.left >= LEAST_LEFT
+    assert SHARES[0] <= challenge.share <= SHARES[1] and challenge.left >= LEAST_LEFT
     assert challenge.seen >= LEAST_SEEN
 
 
