@@ -380,6 +380,8 @@ def sized(
     for _ in range(4):
         motion = sketched(law)
         found, left = motion.shares(plant)
+        if not found > 0.0:  # a gap that the motion stays in
+            break
         if abs(np.log(found / share)) < 0.1:
             if left < 0.9 * LEAST_LEFT or not law.fits(Scene(plant, scene.drive, motion)):
                 break

@@ -27,12 +27,12 @@ from .chain import (
     responses,
     sketch,
 )
-from .challenge import LEAST_LEFT, SAMPLES
+from .challenge import LEAST_LEFT, SAMPLES, sized
 from .drives import Silence
-from .laws import LAWS, NoLaw
+from .laws import LAWS, NoLaw, Scene
 from .laws.damping import Coulomb
 from .laws.memory import DelayedForce
-from .laws.stiffness import DoubleWell
+from .laws.stiffness import DoubleWell, EndStop
 from .plants import EscapeError
 from .sensors import SENSORS
 from .test_laws import FORCES, RATES
@@ -410,6 +410,13 @@ def test_a_law_that_never_gives_a_fair_question_is_reported(monkeypatch: pytest.
     monkeypatch.setattr(chain_module, "_drawn_law", unfair)
     with pytest.raises(RuntimeError, match="no fair coulomb under harmonic in 100 chains"):
         draw_chain(0, causes="coulomb", excitation="harmonic")
+
+
+def test_a_law_that_the_motion_never_meets_is_not_of_its_size():
+    scene = Scene(drawn("maxwell").truth.around((0, 1)), Silence(), drawn("maxwell").motion.link)
+    still = dataclasses.replace(scene.motion, effect=0.0 * scene.motion.x)
+    with pytest.raises(EscapeError, match="no end_stop of this size"):
+        sized(np.random.default_rng(0), EndStop, scene, SHARES, lambda law: still)
 
 
 def test_a_motion_beyond_the_reach_of_its_law_is_refused():
