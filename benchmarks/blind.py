@@ -4,8 +4,9 @@
 
 One line of JSON per challenge is appended to the file as it is done; the same call goes on where it was stopped. With
 `--two`, two effects of different families are hidden at once; with `--outside`, one that no catalogue names; with
-`--dirt`, records are as a laboratory has them: coloured noise, steps, outliers, drift, half a sample of delay. `--page`
-writes who was taken for whom, calibration, gain and time as a page, and the figures as JSON beside it.
+`--chain`, one at some place of two masses in a chain, where the place counts too; with `--dirt`, records are as a
+laboratory has them: coloured noise, steps, outliers, drift, half a sample of delay. `--page` writes who was taken for
+whom, calibration, gain and time as a page, and the figures as JSON beside it.
 """
 
 import argparse
@@ -25,11 +26,25 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.blind_page import write_page  # noqa: E402  (needs the line above when run as a script)
-from benchmarks.blind_table import Row, exact, hidden, said, table  # noqa: E402
-from tests.blind import CAUSES, DIRT, OUTSIDE, PAIRS, Challenge, draw, draw_two, soiled  # noqa: E402
+from benchmarks.blind_table import Row, exact, hidden, said, spot, table  # noqa: E402
+from tests.blind import (  # noqa: E402
+    CAUSES,
+    CHAIN_CAUSES,
+    CHAIN_SETS,
+    DIRT,
+    OUTSIDE,
+    PAIRS,
+    ChainChallenge,
+    Challenge,
+    draw,
+    draw_chain,
+    draw_two,
+    soiled,
+)
 from tests.blind.challenge import CHANNEL_SETS, NOISE_LEVELS  # noqa: E402
 from tests.blind.dirt import TAKEN_FOR  # noqa: E402
 from tests.blind.drives import DRIVES  # noqa: E402
+from tests.blind.plants import Plant  # noqa: E402
 
 HOLDOUT = 0.3
 ROWS_PER_PROCESS = 40
@@ -58,21 +73,33 @@ def examine(seed: int, drawing: Drawing) -> Row:
     return row | said_of_it | {"seconds": time.perf_counter() - begin}
 
 
-def drawn(seed: int, drawing: Drawing) -> Challenge:
-    """The challenge of a seed; with "two" in the drawing, of two of its causes, and with "dirt" soiled by it."""
+def drawn(seed: int, drawing: Drawing) -> Challenge | ChainChallenge:
+    """The challenge of a seed, of two masses with "chain" in the drawing.
+
+    With "two" in it, of two of its causes, and with "dirt" soiled by it.
+    """
     arguments = dict(drawing)
+    if arguments.pop("chain", False):
+        return draw_chain(seed, **arguments)
     dirt = arguments.pop("dirt", None)
     if dirt is not None:
-        return soiled(drawn(seed, arguments), dirt)
+        clean = drawn(seed, arguments)
+        assert isinstance(clean, Challenge)
+        return soiled(clean, dirt)
     if not arguments.pop("two", False):
         return draw(seed, **arguments)
     causes = set(arguments.pop("causes"))
     return draw_two(seed, **arguments, pairs=[pair for pair in PAIRS if causes.issuperset(pair)])
 
 
-def question(challenge: Challenge) -> Row:
+def question(challenge: Challenge | ChainChallenge) -> Row:
     """What was drawn, the truth included."""
-    more: Row = {"beside": dataclasses.asdict(challenge.beside)} if challenge.beside else {}
+    more: Row = {}
+    if isinstance(challenge, ChainChallenge):
+        links = [list(at) for at in challenge.truth.links]
+        more |= {"chain": True, "links": links, "driven": challenge.driven, "seen": challenge.seen}
+    elif challenge.beside:
+        more["beside"] = dataclasses.asdict(challenge.beside)
     if challenge.cause in OUTSIDE:
         more["outside"] = True
     return {
@@ -119,7 +146,7 @@ def answer(diagnosis: Any) -> Row:
     }
 
 
-def _diagnose(challenge: Challenge) -> Any:
+def _diagnose(challenge: Challenge | ChainChallenge) -> Any:
     import jax  # only in the workers, whose environment is settled before it is loaded
 
     import jfsm
@@ -127,7 +154,12 @@ def _diagnose(challenge: Challenge) -> Any:
     channels: dict[str, Any] = {**challenge.channels, "units": challenge.units}
     record = jfsm.Record(time=challenge.time, **channels, at_rest=challenge.at_rest)
     believed = challenge.model
-    model = jfsm.Structure.sdof(mass=believed.mass, stiffness=believed.stiffness, damping=believed.damping)
+    if isinstance(believed, Plant):
+        model = jfsm.Structure.sdof(mass=believed.mass, stiffness=believed.stiffness, damping=believed.damping)
+    else:
+        springs = [jfsm.LinearStiffness(k, at=at) for at, k in believed.stiffness.items()]
+        dashpots = [jfsm.LinearDamping(c, at=at) for at, c in believed.damping.items()]
+        model = jfsm.Structure(mass=list(believed.mass), terms=[*springs, *dashpots])
     return jfsm.diagnose(record, model, holdout=HOLDOUT, key=jax.random.key(challenge.seed))
 
 
@@ -185,10 +217,13 @@ def progress_line(row: Row, done: int, total: int, elapsed: float) -> str:
     """One line for one row: which, the truth, what was said, and the time left."""
     findings = row["findings"] if "beside" in row else row["findings"][:1]
     mark = "ok   " if exact(row) else "WRONG"
+    truth, answer = (
+        f"{words} {place}".rstrip() for words, place in zip((hidden(row), said(row)), spot(row), strict=True)
+    )
     sure = " p=" + " ".join(f"{finding['probability']:.2f}" for finding in findings) if findings else ""
     left = elapsed / done * (total - done)
     return (
-        f"[{done:{len(str(total))}d}/{total}] {mark} seed {row['seed']}: {hidden(row)} -> {said(row)}{sure}"
+        f"[{done:{len(str(total))}d}/{total}] {mark} seed {row['seed']}: {truth} -> {answer}{sure}"
         f"  {row['seconds']:.1f} s, {left / 60:.1f} min left"
     )
 
@@ -223,17 +258,27 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     parser.add_argument("--two", action="store_true", help="hide two of the causes at once")
     parser.add_argument("--outside", action="store_true", help="hide effects that are not in the catalogue instead")
+    parser.add_argument("--chain", action="store_true", help="hide them at some place of two masses in a chain")
     parser.add_argument("--dirt", choices=list(DIRT), help="what comes on the records besides white noise")
-    parser.add_argument("--channels", nargs="+", default=list(CHANNEL_SETS), choices=list(CHANNEL_SETS))
+    parser.add_argument("--channels", nargs="+", choices=list(CHANNEL_SETS | CHAIN_SETS), help="all by default")
     parser.add_argument("--excitation", nargs="+", default=list(DRIVES), choices=list(DRIVES))
     parser.add_argument("--out", type=Path, help="file of JSON lines to append to and to resume from")
     parser.add_argument("--page", type=Path, help="HTML file for pictures and figures; the figures as JSON beside it")
     given = parser.parse_args(arguments)
     if given.page and given.page.suffix != ".html":
         parser.error(f"--page must name an .html file; got {given.page}.")
+    if given.chain and (given.two or given.outside or given.dirt):
+        parser.error("--chain must stand without --two, --outside and --dirt.")
+    sets = list(CHAIN_SETS if given.chain else CHANNEL_SETS)
+    if not set(given.channels or sets) <= set(sets):
+        parser.error(f"--channels must be of {', '.join(sets)}; got {' '.join(given.channels)}.")
+    given.channels = given.channels or sets
     drawing = {name: getattr(given, name) for name in ("causes", "noise", "channels", "excitation")}
     if given.outside:
         drawing["causes"] = list(OUTSIDE)
+    if given.chain:
+        drawing["chain"] = True
+        drawing["causes"] = [cause for cause in drawing["causes"] if cause in CHAIN_CAUSES]
     if given.two:  # not said otherwise, so that files of one effect can be gone on with
         drawing["two"] = True
     if given.dirt:

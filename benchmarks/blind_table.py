@@ -1,6 +1,7 @@
 """What the rows of the blind examination add up to. A row is the dictionary that `benchmarks/blind.py` writes.
 
-Where two effects were hidden, the second stands under "beside".
+Where two effects were hidden, the second stands under "beside". Where there were two masses it says "chain", and the
+place counts by itself.
 """
 
 import collections
@@ -23,7 +24,7 @@ TWINS = (
     frozenset({"force_delay", "channel_delay"}),
 )
 """Causes that narrow-band motion does not separate; delays have no other meaning than that between two channels."""
-_SETS_OF_MANY = ("xva",)
+_SETS_OF_MANY = ("xva", "xx", "aa")
 """Channel sets in which a delay of the force and one of a channel are told apart by the other channels."""
 BINS = 10
 
@@ -71,6 +72,17 @@ def hidden(row: Row) -> str:
     return " + ".join(truth["cause"] for truth in truths(row))
 
 
+def spot(row: Row) -> tuple[str, str]:
+    """Where the cause is in a chain, and where the first finding has it, in words; nothing to be said of one mass."""
+    if not row.get("chain"):
+        return "", ""
+    return _spot(row["at"]), _spot(row["findings"][0]["at"]) if row["findings"] else ""
+
+
+def _spot(at: Sequence[int | str]) -> str:
+    return "at " + "-".join(map(str, at)) if at else ""
+
+
 def kind(row: Row) -> str:
     """ "none", "parameters" (a wrong value of the model's own), "outside" (of the catalogue) or "cause"."""
     if row["cause"] == "none":
@@ -112,6 +124,13 @@ def exact(row: Row) -> bool:
     return row["verdict"] == "cause" and named(row)[:1] == [row["cause"]]
 
 
+def placed(row: Row) -> bool:
+    """Whether the first finding is at the cause's place, or one of the findings at that of a wrong value."""
+    if kind(row) == "parameters":
+        return any(finding["cause"] == row["cause"] and finding["at"] == row["at"] for finding in row["findings"])
+    return bool(row["findings"]) and row["findings"][0]["at"] == row["at"]
+
+
 def in_class(row: Row) -> bool:
     """Whether a cause was named, with the truth first or among the rivals of the first.
 
@@ -150,9 +169,10 @@ def confident(row: Row) -> bool:
 def covers(row: Row) -> dict[str, bool]:
     """For each true number of a rightly named finding, whether its interval holds the truth.
 
-    Of two hidden effects, under the names "cause.number".
+    Of two hidden effects, under the names "cause.number". In a chain a finding elsewhere has no such numbers.
     """
-    estimates = {finding["cause"]: finding["parameters"] for finding in reversed(row["findings"])}
+    findings = [finding for finding in row["findings"] if not row.get("chain") or finding["at"] == row["at"]]
+    estimates = {finding["cause"]: finding["parameters"] for finding in reversed(findings)}
     return {
         f"{truth['cause']}.{name}" if "beside" in row else name: estimate["low"] <= value <= estimate["high"]
         for truth in truths(row)
@@ -234,6 +254,7 @@ def _figures_of_one(rows: Sequence[Row]) -> dict[str, Share | float]:
         "  twins: mean group": _mean([group(row) for row in alike if row["verdict"] == "cause"]),
         "cause first or a rival": Share.of(causes, in_class),
         "family named": Share.of(causes, right_family),
+        **_figures_of_places([row for row in rows if row.get("chain")]),
         "wrong value named": Share.of([row for row in rows if kind(row) == "parameters"], exact),
         "silent where no law is": Share.of(quiet, silent),
         "  with nothing wrong": Share.of([row for row in quiet if kind(row) == "none"], silent),
@@ -245,6 +266,19 @@ def _figures_of_one(rows: Sequence[Row]) -> dict[str, Share | float]:
         "closed share, median": _median(closed),
         "  above 0.9": Share.of(closed, lambda share: share > 0.9),
         "seconds, median": _median([row["seconds"] for row in answered]),
+    }
+
+
+def _figures_of_places(rows: Sequence[Row]) -> dict[str, Share | float]:
+    """Where there were two masses: whether the place is right; nothing where there were none."""
+    if not rows:
+        return {}
+    causes, values = ([row for row in rows if kind(row) == one] for one in ("cause", "parameters"))
+    return {
+        "cause named at its place": Share.of(causes, lambda row: exact(row) and placed(row)),
+        "  place, cause right": Share.of([row for row in causes if exact(row)], placed),
+        "  place, family right": Share.of([row for row in causes if right_family(row)], placed),
+        "  place, value right": Share.of([row for row in values if exact(row)], placed),
     }
 
 
@@ -342,5 +376,6 @@ def _said_of(figure: Share | float) -> str:
 
 
 def _line(row: Row, finding: Row) -> str:
-    answer = f"{hidden(row)} -> {said(row)}, p = {finding['probability']:.3f}"
+    truth, answer = (f"{words} {at}".rstrip() for words, at in zip((hidden(row), said(row)), spot(row), strict=True))
+    answer = f"{truth} -> {answer}, p = {finding['probability']:.3f}"
     return f"seed {row['seed']}: {answer}, {row['excitation']}, {row['channel_set']}, noise {row['noise']:g}"

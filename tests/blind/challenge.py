@@ -1,7 +1,7 @@
 """One challenge is one seed: a plant, what is wrong about the belief in it, and a noisy record."""
 
 import dataclasses
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -165,18 +165,23 @@ def drawn_setting(
     wanted: Mapping[Hidden, Sequence[str]],
     channels: str | Sequence[str],
     excitation: str | Sequence[str] | None,
+    known: Collection[str] = tuple(CHANNEL_SETS),
+    tells: Callable[[str, str, str], bool] | None = None,
 ) -> tuple[Hidden, str, str]:
     """One of what may be hidden, each with its causes, and a channel set and an excitation that can tell them all.
+
+    `known` are the channel sets there are, and `tells` says of a cause whether one of them and an excitation do; it is
+    `can_tell` by default.
 
     Raises
     ------
     ValueError
         If a name is unknown, or if none of `argument` can be told from the records asked for.
     """
-    sets = named("channels", channels, CHANNEL_SETS)
+    sets, tells = named("channels", channels, known), tells or can_tell
     drives = named("excitation", tuple(DRIVES) if excitation is None else excitation, DRIVES)
     settings = {
-        hidden: [(s, e) for s in sets for e in drives if all(can_tell(cause, s, e) for cause in causes)]
+        hidden: [(s, e) for s in sets for e in drives if all(tells(cause, s, e) for cause in causes)]
         for hidden, causes in wanted.items()
     }
     able = [hidden for hidden, records in settings.items() if records]
@@ -280,21 +285,27 @@ def _fair_question(rng: np.random.Generator, cause: str, excitation: str) -> tup
             return plant, drive, start, NoLaw(), integrate(plant, NoLaw(), drive, start, time, scale)
         if cause in NEEDS_REST:
             start = (0.0, 0.0)
+
+        def sketched(law: Law, start=start, bench=(plant, drive, time, limit)) -> Motion:
+            plant, drive, time, limit = bench
+            return sketch(plant, law, drive, start, time, limit)
+
         for _ in range(20):
             try:
-                law = _sized(rng, kind, Scene(plant, drive, plain), start, limit)
+                law = sized(rng, kind, Scene(plant, drive, plain), kind.shares, sketched)
                 begin = law.start(*start, plant.stiffness)
                 motion = trusted_motion(plant, law, drive, begin, time, scale, limit)
             except EscapeError:
                 continue
-            if _is_fair(law, Scene(plant, drive, motion)):
+            if is_fair(law, Scene(plant, drive, motion), law.shares):
                 return plant, drive, begin, law, motion
     raise RuntimeError(f"no fair {cause} under {excitation} in 50 plants; its law's draw must be made to suit it.")
 
 
-def _is_fair(law: Law, scene: Scene) -> bool:
+def is_fair(law: Law, scene: Scene, shares: tuple[float, float]) -> bool:
+    """Whether a law is of the size and the nature that are wanted, along the motion that has come about under it."""
     share, left = scene.motion.shares(scene.plant)
-    smallest, largest = law.shares
+    smallest, largest = shares
     return smallest <= share <= largest and left >= LEAST_LEFT and law.fits(scene)
 
 
@@ -347,10 +358,13 @@ def draw_motion(
     return drive, start, sketch(plant, NoLaw(), drive, start, time)
 
 
-def _sized(rng: np.random.Generator, kind: type[Law], scene: Scene, start: State, limit: float) -> Law:
-    """A law whose effect has a drawn share of the link's force along the motion that it changes itself.
+def sized(
+    rng: np.random.Generator, kind: type[Law], scene: Scene, shares: tuple[float, float],
+    sketched: Callable[[Law], Motion],
+) -> Law:  # fmt: skip
+    """A law whose effect has a share of the link's force, drawn from `shares`, along the motion that it changes itself.
 
-    `scene` holds the motion without it, whose scales are natural to the law.
+    `scene` holds the motion without it, whose scales are natural to the law, and `sketched` gives that under it.
 
     Raises
     ------
@@ -358,14 +372,16 @@ def _sized(rng: np.random.Generator, kind: type[Law], scene: Scene, start: State
         If there is no such law within its reach, or if too little of it would be left.
     """
     plant, plain = scene.plant, scene.motion
-    share = float(np.exp(rng.uniform(*np.log(kind.shares))))
+    share = float(np.exp(rng.uniform(*np.log(shares))))
     link = rms(plant.stiffness * plain.x + plant.damping * plain.v)
     law = kind.draw(rng, scene, share * link)
     if not kind.sized:
         return law
     for _ in range(4):
-        motion = sketch(plant, law, scene.drive, start, plain.time, limit)
+        motion = sketched(law)
         found, left = motion.shares(plant)
+        if not found > 0.0:  # a gap that the motion stays in
+            break
         if abs(np.log(found / share)) < 0.1:
             if left < 0.9 * LEAST_LEFT or not law.fits(Scene(plant, scene.drive, motion)):
                 break

@@ -46,10 +46,23 @@ def integrate(
     RuntimeError
         If the law changes its mode on and on without getting to the next sample, and is not one that creeps.
     """
-    run = _Run(plant, law, drive, start, time, scale, rtol, min(law.reach(plant.stiffness), limit))
-    here, state = float(time[0]), np.array([*start, *law.hidden_start(*start)])
+    run = Run(plant, law, drive, start, time, scale, rtol, min(law.reach(plant.stiffness), limit))
+    y, effect, hidden, instants = follow(run, np.array([*start, *law.hidden_start(*start)]), time)
+    x, v = y
+    return Motion(time, x, v, (run.load(time, y) - effect) / plant.mass, effect, instants, hidden)
+
+
+def follow(
+    run: "Run", state: FloatArray, time: FloatArray
+) -> tuple[FloatArray, FloatArray, tuple[FloatArray, ...], FloatArray]:
+    """States (states, n), force of the law (n,), what it remembers, (n,) each, and the instants at which it changes.
+
+    The states are those of the plant alone; `state` holds the law's as well.
+    """
+    law, here, plain = run.law, float(time[0]), 2 + run.others
+    x, v = state[:2].tolist()
     stops = [*law.stops(here, float(time[-1])).tolist(), float(time[-1])]
-    mode = law.first_mode(*start, run.remembered(here, state), here, float(run.load(here, *start)))
+    mode = law.first_mode(x, v, run.remembered(here, state), here, float(run.load(here, state)))
     pieces, instants = [], []
     done = modes = 0
     while done < time.size:
@@ -61,7 +74,8 @@ def integrate(
         piece = time[done : done + phase.y.shape[1]]
         x, v = phase.y[:2]
         z = run.remembered(piece, phase.y)
-        pieces.append((x, v, np.broadcast_to(law.force(x, v, z, piece, run.load(piece, x, v), mode), x.shape), *z))
+        effect = np.broadcast_to(law.force(x, v, z, piece, run.load(piece, phase.y), mode), x.shape)
+        pieces.append((*phase.y[:plain], effect, *z))
         here, state, done = phase.end, phase.state, done + piece.size
         modes = 0 if piece.size else modes + 1
         if modes > MODES_PER_SAMPLE:
@@ -79,13 +93,12 @@ def integrate(
             if phase.exit is not None or following != mode:
                 instants.append(here)
             mode = following
-    x, v, effect, *hidden = map(np.concatenate, zip(*pieces, strict=True))
-    acceleration = (run.load(time, x, v) - effect) / plant.mass
-    return Motion(time, x, v, acceleration, effect, np.array(instants), tuple(hidden))
+    rows = tuple(map(np.concatenate, zip(*pieces, strict=True)))
+    return np.stack(rows[:plain]), rows[plain], rows[plain + 1 :], np.array(instants)
 
 
 @dataclasses.dataclass(frozen=True)
-class _Phase:
+class Phase:
     """One mode: its samples (states, n), n may be 0; the instant [s] and the state (states,) at its end.
 
     `exit` is the number of the guard that ended it, -1 where a held mass was let go, None where it came to a stop.
@@ -116,7 +129,11 @@ class _Past:
         return float(self.steps[min(bisect.bisect_left(self.ends, t), len(self.ends) - 1)](t)[0])
 
 
-class _Run:
+class Run:
+    """A plant under way with a law: its states are x and v, those that others add, and the law's hidden ones."""
+
+    others = 0  # states of the plant beside x and v: of the same kinds, in pairs
+
     def __init__(
         self, plant: Plant, law: Law, drive: Drive, start: State, time: FloatArray, scale: float, rtol: float,
         reach: float,
@@ -127,26 +144,29 @@ class _Run:
         self.watch = float(step) / WATCHES_PER_SAMPLE
         sizes = {"displacement": scale, "velocity": plant.omega * scale}
         self.sizes = sizes
-        self.atol = rtol * np.array([sizes[kind] for kind in ("displacement", "velocity", *law.hidden)])
+        kinds = ("displacement", "velocity") * (1 + self.others // 2)
+        self.atol = rtol * np.array([sizes[kind] for kind in (*kinds, *law.hidden)])
         self.past = _Past(float(time[0]), start[0])
         self.longest = 0.0
 
-    def load(self, t, x, v):
+    def load(self, t: Any, y: FloatArray) -> Any:
+        """What of all other forces the law meets at t, in the states y (states,) or along (states, n) [N]."""
+        x, v = y[:2]
         return self.drive(t) - self.plant.damping * v - self.plant.stiffness * x
 
     def load_to_hold(self, t: Any, y: FloatArray, mode: Mode) -> Any:
         """What a law that holds the mass has to hold at t, in the states y (states,) or along (states, n) [N]."""
         x, v = y[:2]
-        return self.law.load_to_hold(x, v, self.remembered(t, y), t, self.load(t, x, v), mode)
+        return self.law.load_to_hold(x, v, self.remembered(t, y), t, self.load(t, y), mode)
 
     def remembered(self, t: Any, y: FloatArray) -> Hidden:
         """What the law remembers at t, in the states y (states,) or along (states, n)."""
         if not self.law.delay:
-            return tuple(y[2:])
+            return tuple(y[2 + self.others :])
         late = np.array([self.past(s) for s in np.ravel(t - self.law.delay).tolist()]).reshape(np.shape(t))
-        return *y[2:], late
+        return *y[2 + self.others :], late
 
-    def _rates(self, mode: Mode) -> Callable[[float, FloatArray], Sequence[float]]:
+    def rates(self, mode: Mode) -> Callable[[float, FloatArray], Sequence[float]]:
         """Right-hand side within a mode."""
         m, k, c = self.plant.mass, self.plant.stiffness, self.plant.damping
         drive, force, hidden_rates = self.drive, self.law.force, self.law.hidden_rates
@@ -170,9 +190,10 @@ class _Run:
 
         return with_delay if delay else with_memory if self.law.hidden else rates
 
-    def _guards(self, mode: Mode, y: Any) -> list[Any]:
-        """Guards of a mode, each raised by its slack, at y (states,) or along (states, n)."""
+    def guards(self, mode: Mode, t: Any, y: Any) -> list[Any]:
+        """Guards of a mode, each raised by its slack, at t in the states y (states,) or along (states, n)."""
         x, v, *z = y
+        z = z[self.others :]
         speeds = self.law.velocity_guards(mode, x, v, z)
         lengths = self.law.displacement_guards(mode, x, v, z)
         if not speeds and not lengths:
@@ -180,11 +201,11 @@ class _Run:
         speed, length = (self.law.slack * self.sizes[kind] for kind in ("velocity", "displacement"))
         return [guard + speed for guard in speeds] + [guard + length for guard in lengths]
 
-    def moving(self, mode: Mode, here: float, until: float, state: FloatArray, time: FloatArray) -> _Phase:
+    def moving(self, mode: Mode, here: float, until: float, state: FloatArray, time: FloatArray) -> Phase:
         watched = not self.law.smooth
-        before = self._guards(mode, state.tolist()) if watched else []
+        before = self.guards(mode, here, state.tolist()) if watched else []
         solver = DOP853(
-            self._rates(mode), here, state, until, rtol=self.rtol, atol=self.atol,  # pyright: ignore[reportArgumentType]
+            self.rates(mode), here, state, until, rtol=self.rtol, atol=self.atol,  # pyright: ignore[reportArgumentType]
             # A delay's pieces are many and short: each goes on with the steps of the one before.
             first_step=min(self.longest, until - here) if self.law.delay and self.longest else None,
         )  # fmt: skip
@@ -201,7 +222,7 @@ class _Run:
             step = solver.dense_output()
             crossing = None
             if watched:
-                after = self._guards(mode, solver.y.tolist())
+                after = self.guards(mode, end, solver.y.tolist())
                 crossing = self._crossing(mode, step, begin, end, before, after)
                 before = after
             if crossing:
@@ -213,8 +234,8 @@ class _Run:
                 samples.append(step(time[done:passed]))
                 done = passed
             if crossing:
-                return _Phase(_joined(samples, state.size), end, step(end), crossing[1])
-        return _Phase(_joined(samples, state.size), until, solver.y, None)
+                return Phase(_joined(samples, state.size), end, step(end), crossing[1])
+        return Phase(_joined(samples, state.size), until, solver.y, None)
 
     def _crossing(
         self, mode: Mode, step: Callable[[Any], FloatArray], begin: float, end: float,
@@ -222,13 +243,13 @@ class _Run:
     ) -> tuple[float, int] | None:  # fmt: skip
         """The first instant within a step at which a guard comes to zero, and which guard."""
         grid = np.linspace(begin, end, LOOKS_PER_STEP + 1)
-        values = np.array([np.broadcast_to(guard, grid.shape) for guard in self._guards(mode, step(grid))])
+        values = np.array([np.broadcast_to(guard, grid.shape) for guard in self.guards(mode, grid, step(grid))])
         values[:, 0], values[:, -1] = before, after
         crossings = []
         for which, y in enumerate(values):
 
             def guard(t: float, which: int = which) -> float:
-                return self._guards(mode, step(t).tolist())[which]
+                return self.guards(mode, t, step(t).tolist())[which]
 
             if y[0] < 0.0:  # by the rounding of the instant at which the mode began; if it goes on falling, it is over
                 if y[-1] < 10.0 * y[0]:
@@ -240,7 +261,7 @@ class _Run:
                 crossings.append((float(root), which))  # pyright: ignore[reportArgumentType]
         return min(crossings, default=None)
 
-    def held(self, mode: Mode, here: float, until: float, state: FloatArray, time: FloatArray) -> _Phase:
+    def held(self, mode: Mode, here: float, until: float, state: FloatArray, time: FloatArray) -> Phase:
         x, z = float(state[0]), tuple(state[2:].tolist())
 
         def still(t):
@@ -267,7 +288,7 @@ class _Run:
         if self.law.delay:
             self.past.append(end, still)
         samples = int(np.searchsorted(time, end, side="right"))
-        return _Phase(still(time[:samples]), end, still(end), let_go)
+        return Phase(still(time[:samples]), end, still(end), let_go)
 
 
 def _joined(samples: Sequence[FloatArray], states: int) -> FloatArray:

@@ -3,13 +3,14 @@
 import abc
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar, Self, TypeAlias
+from typing import Any, ClassVar, Self, TypeAlias, TypeVar
 
 import numpy as np
 
 from .arrays import FloatArray, rms
 
 Channels: TypeAlias = dict[str, FloatArray]
+Key = TypeVar("Key")
 Place: TypeAlias = tuple[str, int]  # kind of channel, degree of freedom
 
 UNITS = {"force": "N", "displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
@@ -25,6 +26,7 @@ class Sensor(abc.ABC):
     early: ClassVar[bool] = False  # whether the motion before the record's first sample is needed
     after_noise: ClassVar[bool] = False  # whether noise is misread as well
     channel: str
+    mass: int = dataclasses.field(default=1, kw_only=True)  # which degree of freedom it sits at
 
     @classmethod
     @abc.abstractmethod
@@ -33,7 +35,7 @@ class Sensor(abc.ABC):
 
     @property
     def at(self) -> Place:
-        return self.channel, 1
+        return self.channel, self.mass
 
     @property
     @abc.abstractmethod
@@ -151,6 +153,6 @@ SENSORS: dict[str, tuple[type[Sensor], tuple[str, ...]]] = FIRST_SENSORS | {
 }
 
 
-def with_noise(rng: np.random.Generator, channels: Channels, level: float) -> Channels:
+def with_noise(rng: np.random.Generator, channels: dict[Key, FloatArray], level: float) -> dict[Key, FloatArray]:
     """White Gaussian noise on every channel (n,), `level` of that channel's rms."""
     return {kind: y + level * rms(y) * rng.standard_normal(y.size) for kind, y in channels.items()}

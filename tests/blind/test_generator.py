@@ -228,10 +228,11 @@ def test_effects_are_of_the_promised_size_along_the_true_motion(cause: str):
 def test_a_question_is_fair_only_if_its_effect_is_large_enough_small_enough_and_not_a_linear_one():
     time = np.linspace(0.0, 10.0, 1000)
     x, v = np.cos(PLANT.omega * time), -PLANT.omega * np.sin(PLANT.omega * time)
+    law = CubicHardening(k3=1.0)
 
     def fair(effect: np.ndarray) -> bool:
         scene = Scene(PLANT, Silence(), Motion(time, x, v, x, effect, np.empty(0)))
-        return challenge_module._is_fair(CubicHardening(k3=1.0), scene)
+        return challenge_module.is_fair(law, scene, law.shares)
 
     assert fair(0.2 * PLANT.stiffness * x**3)
     assert not fair(0.02 * PLANT.stiffness * x**3) and not fair(2.0 * PLANT.stiffness * x**3)

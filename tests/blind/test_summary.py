@@ -21,6 +21,7 @@ from benchmarks.blind_table import (
     hidden,
     in_class,
     kind,
+    placed,
     right_class,
     right_family,
     said,
@@ -282,6 +283,70 @@ def test_the_table_of_two_effects_counts_each_row_where_it_belongs():
     assert "seed 8: coulomb + cubic_hardening -> coulomb + jenkins, p = 0.970, sweep, x, noise 0.01" in sure
     assert "seed 9" in sure and sure.count("seed") == 2
     assert table([TWO_FAILED, TWO]).startswith("pairs")
+
+
+# two masses
+
+
+CHAIN = row("coulomb", "cause", finding("coulomb", F=(1.9, 2.1)), parameters={"F": 2.0}, chain=True)
+ELSEWHERE = CHAIN | {"findings": [finding("coulomb", F=(1.9, 2.1)) | {"at": [1, 2]}], "seed": 2}
+ITS_FAMILY = CHAIN | {"findings": [finding("quadratic_damping")]}
+CHAIN_VALUE = VALUE | {"chain": True}
+VALUE_ELSEWHERE = CHAIN_VALUE | {"at": [1, 2]}
+
+
+def test_in_a_chain_the_place_is_right_or_wrong_by_itself():
+    rows = [CHAIN, ELSEWHERE, ITS_FAMILY, CHAIN_VALUE, VALUE_ELSEWHERE, CHAIN | {"findings": []}]
+    assert [placed(r) for r in rows] == [True, False, True, True, False, False]
+    assert [exact(r) for r in rows] == [True, True, False, True, True, False]
+    assert covers(CHAIN) == {"F": True} and covers(ELSEWHERE) == {}
+
+
+def test_the_table_counts_places_where_there_were_two_masses():
+    text = table([CHAIN, ELSEWHERE, ITS_FAMILY, CHAIN_VALUE, VALUE_ELSEWHERE, NAMED])
+    lines = [" ".join(line.split("(")[0].split()) for line in text.splitlines()]
+    for expected in (
+        "cause named exactly 3 of 4 = 75%",
+        "cause named at its place 1 of 3 = 33%",
+        "place, cause right 1 of 2 = 50%",
+        "place, family right 2 of 3 = 67%",
+        "place, value right 1 of 2 = 50%",
+    ):
+        assert expected in lines
+    assert "place" not in table([NAMED, RIVAL])
+
+
+def test_in_a_chain_a_line_tells_the_places():
+    assert "coulomb at 0-1 -> coulomb at 1-2 p=0.99" in blind.progress_line(ELSEWHERE, 1, 1, 1.0)
+    nothing = row("none", "consistent", at=[], chain=True)
+    assert "none -> consistent  2.0 s" in blind.progress_line(nothing, 1, 1, 1.0)
+    late = row("force_delay", "cause", finding("accel_gain") | {"at": ["acceleration", 2]}, at=["force", 1], chain=True)
+    assert "seed 1: force_delay at force-1 -> accel_gain at acceleration-2, p = 0.990" in table([late])
+
+
+def test_the_causes_are_hidden_in_a_chain_where_the_drawing_says_so(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(blind, "_diagnose", lambda challenge: diagnosis(None))
+    drawing = {"causes": ["force_gain"], "excitation": ["harmonic"], "channels": ["xx"], "chain": True}
+    result = blind.examine(0, drawing)
+    assert result["drawing"] == drawing and json.loads(json.dumps(result)) == result
+    assert result["chain"] and result["cause"] == "force_gain" and result["at"] == ["force", result["driven"]]
+    assert result["links"][:2] == [[0, 1], [1, 2]] and not exact(result)
+
+
+def test_only_a_call_for_a_chain_draws_one(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    drawings = []
+    monkeypatch.setattr(blind, "run", lambda seeds, drawing, *others: drawings.append(drawing) or [])
+    blind.main(["--causes", "coulomb", "clipping"])
+    blind.main(["--causes", "coulomb", "clipping", "--chain"])
+    assert "chain" not in drawings[0] and drawings[0]["channels"] == ["xva", "x", "a"]
+    assert drawings[1]["chain"] and drawings[1]["causes"] == ["coulomb"] and "xx" in drawings[1]["channels"]
+    for wrong_call, words in (
+        (["--chain", "--two"], "--chain must stand without"),
+        (["--channels", "xx"], "--channels must be of xva, x, a; got xx"),
+    ):
+        with pytest.raises(SystemExit):
+            blind.main(wrong_call)
+        assert words in capsys.readouterr().err
 
 
 def diagnosis(gain: SimpleNamespace | None) -> SimpleNamespace:
