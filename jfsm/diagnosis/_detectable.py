@@ -28,7 +28,7 @@ from ..structures import Structure
 from ._adequacy import NOTICEABLE, SIGNIFICANT
 from ._candidates import Candidate, hypothesis, modest
 from ._effect import Effect
-from ._trial import Trial, extent, sets, windows
+from ._trial import SLACKS, Trial, extent, sets, windows
 
 _SPARED = 1.28
 """Standard deviations of chance that an effect has to spare: nine of ten then pass."""
@@ -71,6 +71,12 @@ class Silence(NamedTuple):
         """Nats by which the model as given is ahead of the refit."""
         return self.given.evidence - self.refitted.evidence
 
+    @property
+    def nuisances(self) -> dict[tuple[str, int | None], float]:
+        """Those of every record, by path and record, as fitted beside the model as given."""
+        found = zip(self.given.unknowns, self.given.theta, strict=True)
+        return {(u.path, u.record): float(theta) for u, theta in found if u.record is not None}
+
 
 def detectable(trials: Sequence[Trial], silence: Silence) -> list[Smallest]:
     """Smallest sizes of single effects that were fitted, in the shapes that the fits gave them."""
@@ -112,7 +118,8 @@ class _Seen:
 
     def natural(self) -> Smallest | None:
         """Its smallest size from a modest one; from that found, where it is far from modest."""
-        theta = self.posterior.initial()[0]
+        nuisances = self.silence.nuisances
+        theta = np.array([nuisances.get((u.path, u.record), u.theta) for u in self.unknowns])
         factor = self.factor(theta, self._information(theta))
         if factor < 1 / _FAR or _FAR < factor < math.inf:
             theta = self.grown(theta, math.log(min(factor, _FARTHEST)))
@@ -179,18 +186,31 @@ def _significant(told: np.ndarray, needed: float, cost: Callable[[float], float]
 
 
 def _noticeable(posterior: Posterior, theta: np.ndarray, gone: np.ndarray, given: Trial) -> float:
-    """Factor from which the model as given, which lacks the effect, predicts noticeably worse on some set."""
-    power = []
+    """Factor from which the model as given, which lacks the effect, predicts noticeably worse on some set.
+
+    It is judged by the best of its predictions, the looser ones too: these err more by themselves, and by less where
+    something is missing.
+    """
+    left, moved = (np.array(part) for part in zip(*(_powers(posterior, theta, gone, s) for s in SLACKS), strict=True))
+    least = NOTICEABLE * given.prediction.expected + _SPARED * given.prediction.scatter
+    with np.errstate(divide="ignore", invalid="ignore"):
+        needed = np.maximum(least - (left - left[0]), 0.0) / moved
+    return math.sqrt(float(np.min(np.max(np.nan_to_num(needed, nan=math.inf, posinf=math.inf), 0))))
+
+
+def _powers(posterior: Posterior, theta: np.ndarray, gone: np.ndarray, slack: float) -> tuple[np.ndarray, np.ndarray]:
+    """Error without the effect, and how the effect moves predictions, as powers per set, (sets,) each."""
+    left, moved = [], []
     for index, nuisances in enumerate(posterior.records):
         use, scored = windows(nuisances)
-        there, not_there = (
-            posterior.innovations(values, index, use=use, noise_scales=False).error for values in (theta, gone)
+        there, error = (
+            posterior.innovations(values, index, use=use, noise_scales=False, slack=slack).error
+            for values in (theta, gone)
         )
-        moved = ((there - not_there) / extent(nuisances)) ** 2
         alive = np.asarray(nuisances.readings.use)[: nuisances.samples] > 0
         for chosen in sets(nuisances, posterior.until[index]):
             mask = (scored & chosen)[:, None] & alive
-            power.append(np.sum(np.sum(np.where(mask, moved, 0.0), 0) / np.maximum(mask.sum(0), 1)))
-    least = NOTICEABLE * given.prediction.expected + _SPARED * given.prediction.scatter
-    found = np.nan_to_num(np.array(power), nan=0.0)
-    return math.sqrt(float(np.min(least[found > 0] / found[found > 0]))) if np.any(found > 0) else math.inf
+            for found, readings in ((left, error), (moved, there - error)):
+                power = np.where(mask, (readings / extent(nuisances)) ** 2, 0.0)
+                found.append(np.sum(np.sum(power, 0) / np.maximum(mask.sum(0), 1)))
+    return np.array(left), np.array(moved)

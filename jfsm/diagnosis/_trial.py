@@ -21,7 +21,7 @@ _SLIGHT = 3.0
 """
 _CHANCE = 2.0
 """Standard deviations by which noise may leave more than it does in the mean."""
-_SLACKS = (0.0, 0.01, 0.05)
+SLACKS = (0.0, 0.01, 0.05)
 """How loosely the state may be held while it is filtered; each hypothesis is judged by its best."""
 _LOST = 0.05
 """Share of a baseline's error that noise may leave of a prediction, whatever its filter says."""
@@ -160,7 +160,7 @@ def predict(posterior: Posterior, theta: np.ndarray, slight: bool = False) -> Pr
         mine = [u.path.startswith(("offset@force", "offset@acceleration")) for u in posterior.hypothesis.unknowns[0]]
         theta = np.where(mine, np.clip(theta, -_SLIGHT, _SLIGHT), theta)
     best: list[tuple[float, Prediction]] = []
-    for slack in _SLACKS:
+    for slack in SLACKS:
         errors, expected, scatter = [], [], []
         for index, nuisances in enumerate(posterior.records):
             use, scored = windows(nuisances)
