@@ -47,6 +47,11 @@ def test_an_effect_of_that_size_comes_with_its_place_and_all_its_numbers(silent)
     assert silent.data["detectable"]["jenkins"]["effect"]["slip"]["unit"] == "m"
 
 
+def test_a_law_that_is_another_one_at_that_size_has_none():
+    d = jfsm.diagnose(made(linear), RIGHT, causes=["double_well", "cubic_hardening"], key=jax.random.key(0))
+    assert set(d.detectable) == {"cubic_hardening"}  # with less stiffness taken than there is it has one well
+
+
 def test_a_spring_of_that_size_is_found_and_one_of_a_third_of_it_is_not(silent):
     size = silent.detectable["cubic_hardening"].value
     found = []

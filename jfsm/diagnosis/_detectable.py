@@ -13,7 +13,8 @@ It is one that nine of ten records, alike but for their noise, let pass each of 
 Eight of ten or more then pass both. Silence is worth something only if an effect of the stated size seldom keeps
 silent, so one of two would not do; ninety-nine of a hundred would take an effect half as large again, of which fewer
 records could say anything. A third of the size brings a ninth of the nats, which is not significant. The nats are exact
-for a law that is linear in its size, and an estimate for friction and large effects.
+for a law that is linear in its size, and an estimate for friction and large effects. That the name may stay open
+between laws of several families, as under a single line, is not allowed for.
 """
 
 import math
@@ -35,7 +36,8 @@ _SPARED = 1.28
 _GONE = 30.0
 """Logarithm of the factor by which an effect is made smaller to see what it does."""
 _FAR, _FARTHEST = 3.0, 10.0
-"""Factor to another size from which an effect is looked at once more in that size, and the largest such one."""
+"""Factor to another size from which an effect is looked at once more in that size, and the largest such one. Beyond a
+second time nothing is said."""
 _ROUNDS = 30
 """The cost of an effect's numbers grows with the logarithm of its size, and settles soon."""
 
@@ -117,23 +119,29 @@ class _Seen:
         self.grows = np.array([self.unknowns[k].path in sizes for k in self.mine])
 
     def natural(self) -> Smallest | None:
-        """Its smallest size from a modest one; from that found, where it is far from modest."""
+        """Its smallest size from a modest one; from that found, where it is far from modest.
+
+        None where it would have to be so large that nothing is known of what it does there.
+        """
         nuisances = self.silence.nuisances
         theta = np.array([nuisances.get((u.path, u.record), u.theta) for u in self.unknowns])
         factor = self.factor(theta, self._information(theta))
         if factor < 1 / _FAR or _FAR < factor < math.inf:
             theta = self.grown(theta, math.log(min(factor, _FARTHEST)))
             factor = self.factor(theta, self._information(theta))
-        return self.smallest(theta, factor)
+        return self.smallest(theta, factor) if factor < _FAR else None
 
     def _information(self, theta: np.ndarray) -> np.ndarray:
         return self.posterior.evaluate(theta[None])[2][0]
 
     def smallest(self, theta: np.ndarray, factor: float) -> Smallest | None:
-        """The effect in so many sizes that it has; None where no size would do."""
+        """The effect in so many sizes that it has; None where no size would do, or where it is another law then."""
         if not math.isfinite(factor):
             return None
         structure = self.posterior.structure(self.grown(theta, math.log(factor)))
+        law = structure.terms[-1]
+        if not self.effects[0].cause.is_sensor and law.otherwise(structure.stiffness_of(law.at)):
+            return None
         values = structure.values()
         return Smallest(self.effects, structure, self.path, {p: values[p] for p in self.paths})
 

@@ -163,11 +163,6 @@ class _Searched:
     def every(self) -> list[Trial]:
         return [self.given, self.refitted, *self.trials]
 
-    def dropped_laws(self, every: Sequence[Candidate]) -> list[Candidate]:
-        """Candidates of laws that were tried, and left behind."""
-        dropped = {b.effects for b in self.behind}
-        return [c for c in every if c.effects in dropped and not c.effects[0].cause.is_sensor]
-
 
 def _searched(
     every: list[Candidate],
