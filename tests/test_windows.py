@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.diagnosis._trial import _windows, extent
+from jfsm.diagnosis._trial import extent, windows
 from jfsm.identification import Nuisances, prepare
 
 MASS, DAMPING = 2.0, 8.0
@@ -31,7 +31,7 @@ def test_what_a_spring_holds_is_predicted_for_some_periods_and_its_error_is_a_sh
 def test_what_nothing_holds_is_predicted_until_damping_stops_it_and_its_error_is_a_share_of_that_motion():
     n = prepared(stiffness=0.0)
     assert 3 * n.period == pytest.approx(MASS / DAMPING, rel=1e-6)
-    used, free = _windows(n)
+    used, free = windows(n)
     lengths = np.diff(np.flatnonzero(np.diff(free.astype(int))))[::2]
     assert np.all(np.abs(lengths[:-1] - MASS / DAMPING / 0.01) <= 2) and not np.any(used[free])
     # A sine of unit size moves by 0.3/√2 in a second; evenly spread over a window of T seconds by T/√12 times as much.

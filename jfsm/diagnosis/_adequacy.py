@@ -14,7 +14,7 @@ NEGLIGIBLE = 0.02
 """Excess, as a share of the signal, below which nothing but a perfect explanation is a finding."""
 NEARLY_ALL, MUCH = 0.8, 0.1
 """A law that explains less than this share of the excess and leaves more than this share of the signal is near."""
-_NOTICEABLE = 0.1
+NOTICEABLE = 0.1
 """Excess, as a share of the power that noise leaves, from which a set says anything about an effect."""
 _ALMOST_ALL = 0.95
 """A law that explains this share of the excess along an imposed motion stands, whatever a map makes of the rest."""
@@ -35,7 +35,7 @@ def white(trial: Trial) -> bool:
 def explained(trial: Trial, baseline: Trial) -> float:
     """Smallest share of the baseline's excess power that a trial explains, over the sets where there is any."""
     start, left = baseline.prediction.excess, trial.prediction.excess
-    significant = start > np.maximum(_NOTICEABLE * baseline.prediction.expected, 1e-9)
+    significant = start > np.maximum(NOTICEABLE * baseline.prediction.expected, 1e-9)
     if not np.any(significant):
         return 0.0
     return float(np.min(1.0 - left[significant] / start[significant])) if np.all(np.isfinite(left)) else -math.inf

@@ -226,8 +226,10 @@ def natural_starts(model: Structure, cause: Cause, at: tuple, nuisances: Nuisanc
 
 
 def modest(candidate: Candidate, model: Structure, nuisances: Nuisances) -> Structure:
-    """The model with a small effect of a law, of a natural shape."""
+    """The model with a small effect of a natural shape."""
     [(cause, at)] = candidate.effects
+    if cause.is_sensor:
+        return candidate.starts[0]
     shapes = cause.effect.shapes(scale_of(nuisances, model))
     shape = shapes[len(shapes) // 2]
     size = {p.name: _MODEST * (cause.sign or 1) if p.force else 1.0 for p in cause.effect.parameters}

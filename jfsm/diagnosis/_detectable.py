@@ -1,67 +1,224 @@
-"""The smallest effect that a record would have shown."""
+"""The smallest effect that a record would have shown.
+
+It is one that nine of ten records, alike but for their noise, let pass each of two hurdles of a verdict:
+
+* its evidence beats that of the refit and that of the model as given by what is significant. An effect that is f times
+  as large as in some structure moves the readings by f√J standard deviations more than what is refitted can follow, and
+  gains half the square of so many nats; chance adds a normal deviate before the square is taken. Its numbers cost what
+  they cost in Laplace's evidence: Σ z²/2 + ln |1 + W S W| / 2, z and W being where they stand and how wide they are
+  believed to be beforehand, S the information that the readings hold on them. Own values are free beside an effect; the
+  model as given, where they are not, is ahead of the refit by what they cost, and follows less.
+* without it the model as given predicts noticeably worse than noise lets it.
+
+Eight of ten or more then pass both. Silence is worth something only if an effect of the stated size seldom keeps
+silent, so one of two would not do; ninety-nine of a hundred would take an effect half as large again, of which fewer
+records could say anything. A third of the size brings a ninth of the nats, which is not significant. The nats are exact
+for a law that is linear in its size, and an estimate for friction and large effects. That the name may stay open
+between laws of several families, as under a single line, is not allowed for.
+"""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from .._threads import compiled_once, side_by_side
-from ..identification import Nuisances, Posterior, Unknown, prior
+from ..identification import Nuisances, Posterior, prior
 from ..structures import Structure
+from ._adequacy import NOTICEABLE, SIGNIFICANT
 from ._candidates import Candidate, hypothesis, modest
-from ._trial import Trial
+from ._effect import Effect
+from ._trial import SLACKS, Trial, extent, sets, windows
 
-_NATS = 10.0
-"""Evidence that an effect must bring: the margin of a finding, and what its freedom costs."""
+_SPARED = 1.28
+"""Standard deviations of chance that an effect has to spare: nine of ten then pass."""
+_GONE = 30.0
+"""Logarithm of the factor by which an effect is made smaller to see what it does."""
+_FAR, _FARTHEST = 3.0, 10.0
+"""Factor to another size from which an effect is looked at once more in that size, and the largest such one. Beyond a
+second time nothing is said."""
+_ROUNDS = 30
+"""The cost of an effect's numbers grows with the logarithm of its size, and settles soon."""
 
-Smallest = tuple[str, float]
-"""Path and size of an effect."""
-Unseen = list[tuple[Candidate, Structure, Smallest | None]]
-"""Laws that were not fitted, with a structure that has them, and their smallest size."""
 
+class Smallest(NamedTuple):
+    """The structure with an effect of the smallest size that would have been found, and the effect's numbers by path.
 
-def detectable(trial: Trial, own: set[str]) -> Smallest | None:
-    """Smallest size of a candidate's effect at which it would have been found; None without an effect.
-
-    An effect of size a brings a²/2s² nats, s being the standard error that the readings alone leave it, everything
-    else refitted. Taken at the trial's own values: exact for a law linear in its size, an estimate for friction.
+    That at `path` stands for its size; all that hold a force grow together.
     """
-    return _smallest(trial.unknowns, trial.theta, trial.information, own)
+
+    effects: tuple[Effect, ...]
+    structure: Structure
+    path: str
+    numbers: dict[str, float]
+
+    @property
+    def size(self) -> float:
+        """The number at `path`, without its sign."""
+        return abs(self.numbers[self.path])
 
 
-def also_detectable(
-    candidates: Sequence[Candidate], model: Structure, records: Sequence[Nuisances], until: Sequence[int]
-) -> Unseen:
-    """The same for laws that were not fitted, each at a modest size of a natural shape beside `model`."""
-    posteriors = []
+class Silence(NamedTuple):
+    """What was believed, and is to be beaten."""
+
+    given: Trial
+    refitted: Trial
+    model: Structure
+    records: Sequence[Nuisances]
+    until: Sequence[int]
+
+    @property
+    def spared(self) -> float:
+        """Nats by which the model as given is ahead of the refit."""
+        return self.given.evidence - self.refitted.evidence
+
+    @property
+    def nuisances(self) -> dict[tuple[str, int | None], float]:
+        """Those of every record, by path and record, as fitted beside the model as given."""
+        found = zip(self.given.unknowns, self.given.theta, strict=True)
+        return {(u.path, u.record): float(theta) for u, theta in found if u.record is not None}
+
+
+def detectable(trials: Sequence[Trial], silence: Silence) -> list[Smallest]:
+    """Smallest sizes of single effects that were fitted, in the shapes that the fits gave them."""
+
+    def smallest(t: Trial) -> Smallest | None:
+        seen = _Seen(t.effects, t.posterior(silence.records, silence.until), silence)
+        return seen.smallest(t.theta, seen.factor(t.theta, t.information))
+
+    found = side_by_side(smallest, [t for t in trials if len(t.effects) == 1])
+    return [one for one in found if one is not None]
+
+
+def naturally_detectable(candidates: Sequence[Candidate], silence: Silence) -> list[Smallest]:
+    """The same of any candidates, each in a natural shape: nothing speaks for that with which a fit of noise ends."""
+    every = []
     for candidate in candidates:
-        start = modest(candidate, model, records[0])
-        resolved = [n.resolving([start]) for n in records]
-        posteriors.append(Posterior(hypothesis(model, [start], resolved), resolved, until))
-    information = {}
-    for together in compiled_once(posteriors):
-        outcomes = side_by_side(lambda p: p.evaluate(p.initial())[2][0], together)
-        information.update(zip(together, outcomes, strict=True))
-    own, found = set(model.entries()), []
-    for candidate, posterior in zip(candidates, posteriors, strict=True):
-        theta = posterior.initial()[0]
-        size = _smallest(posterior.hypothesis.unknowns[0], theta, information[posterior], own)
-        found.append((candidate, posterior.hypothesis.structures[0], size))
-    return found
+        start = modest(candidate, silence.model, silence.records[0])
+        records = [n.resolving([start]) for n in silence.records]
+        posterior = Posterior(hypothesis(silence.model, [start], records), records, silence.until)
+        every.append(_Seen(candidate.effects, posterior, silence))
+    found = [one for together in compiled_once(every) for one in side_by_side(_Seen.natural, together)]
+    return [one for one in found if one is not None]
 
 
-def _smallest(
-    unknowns: Sequence[Unknown], theta: np.ndarray, information: np.ndarray, own: set[str]
-) -> Smallest | None:
-    effect = [k for k, u in enumerate(unknowns) if u.record is None and u.path not in own]
-    if not effect or not np.all(np.isfinite(information)):
-        return None
-    k = effect[0]
-    rest = np.array([i for i in range(len(unknowns)) if i != k])
-    information = information.copy()
-    information[k, k] -= prior(unknowns, theta)[2][k]  # what the readings say, without what was believed
-    cross = information[k, rest]
-    left = information[k, k] - cross @ np.linalg.lstsq(information[np.ix_(rest, rest)], cross, rcond=None)[0]
-    if left <= 0:
-        return unknowns[k].path, math.inf
-    return unknowns[k].path, abs(unknowns[k].slope(theta[k])) / math.sqrt(left) * math.sqrt(2 * _NATS)
+class _Seen:
+    """An effect as the readings see it. Sizes among its numbers are logarithms, and grow together."""
+
+    def __init__(self, effects: tuple[Effect, ...], posterior: Posterior, silence: Silence):
+        self.effects, self.posterior, self.silence = effects, posterior, silence
+        self.unknowns, self.program = posterior.hypothesis.unknowns[0], posterior.program
+        own, entries = silence.model.entries(), posterior.hypothesis.structures[0].entries()
+        self.mine = [k for k, u in enumerate(self.unknowns) if u.record is None and u.path not in own]
+        self.path = self.unknowns[self.mine[0]].path
+        part = self.path.split(".")[0] + "."
+        self.paths = [p for p in entries if p.startswith(part) and p not in own]
+        # Of a sensor's fault no number holds a force: the only one that it has is its size.
+        sizes = {p for p in self.paths if entries[p][0].force} or {self.path}
+        self.grows = np.array([self.unknowns[k].path in sizes for k in self.mine])
+
+    def natural(self) -> Smallest | None:
+        """Its smallest size from a modest one; from that found, where it is far from modest.
+
+        None where it would have to be so large that nothing is known of what it does there.
+        """
+        nuisances = self.silence.nuisances
+        theta = np.array([nuisances.get((u.path, u.record), u.theta) for u in self.unknowns])
+        factor = self.factor(theta, self._information(theta))
+        if factor < 1 / _FAR or _FAR < factor < math.inf:
+            theta = self.grown(theta, math.log(min(factor, _FARTHEST)))
+            factor = self.factor(theta, self._information(theta))
+        return self.smallest(theta, factor) if factor < _FAR else None
+
+    def _information(self, theta: np.ndarray) -> np.ndarray:
+        return self.posterior.evaluate(theta[None])[2][0]
+
+    def smallest(self, theta: np.ndarray, factor: float) -> Smallest | None:
+        """The effect in so many sizes that it has; None where no size would do, or where it is another law then."""
+        if not math.isfinite(factor):
+            return None
+        structure = self.posterior.structure(self.grown(theta, math.log(factor)))
+        law = structure.terms[-1]
+        if not self.effects[0].cause.is_sensor and law.otherwise(structure.stiffness_of(law.at)):
+            return None
+        values = structure.values()
+        return Smallest(self.effects, structure, self.path, {p: values[p] for p in self.paths})
+
+    def grown(self, theta: np.ndarray, more: float) -> np.ndarray:
+        """Unknowns with an effect that is larger by such a logarithm."""
+        grown = theta.copy()
+        grown[np.array(self.mine)[self.grows]] += more
+        return grown
+
+    def factor(self, theta: np.ndarray, information: np.ndarray) -> float:
+        """How many times as large it has to be."""
+        if not np.all(np.isfinite(information)):
+            return math.inf
+        believed, mine, grows = prior(self.unknowns, theta)[2], self.mine, self.grows
+        width, center = (np.array([getattr(self.unknowns[k], name) for k in mine]) for name in ("width", "center"))
+        free = [k for k in range(theta.size) if k not in mine]
+        nuisances = [k for k in free if self.unknowns[k].record is not None]
+        beside_refit, beside_given = (_told(information, believed, mine, others) for others in (free, nuisances))
+        scaled = np.maximum(np.linalg.eigvalsh(width[:, None] * beside_refit * width), 0.0)
+
+        def cost(factor: float) -> float:
+            far = (theta[mine] + grows * math.log(factor) - center) / width
+            return 0.5 * float(np.sum(far**2) + np.sum(np.log1p(factor**2 * scaled)))
+
+        # Own values may make up for a sensor's fault: it has to be likelier than they are, by no margin.
+        margin = 0.0 if all(effect.cause.is_sensor for effect in self.effects) else SIGNIFICANT
+        return max(
+            _significant(beside_refit[np.ix_(grows, grows)], margin, cost),
+            _significant(beside_given[np.ix_(grows, grows)], SIGNIFICANT + self.silence.spared, cost),
+            _noticeable(self.posterior, theta, self.grown(theta, -_GONE), self.silence.given),
+        )
+
+
+def _told(information: np.ndarray, believed: np.ndarray, mine: list[int], free: list[int]) -> np.ndarray:
+    """Information of the readings alone on an effect's numbers, beside which others are refitted."""
+    cross = information[np.ix_(free, mine)]
+    taken = cross.T @ np.linalg.lstsq(information[np.ix_(free, free)], cross, rcond=None)[0]
+    return information[np.ix_(mine, mine)] - np.diag(believed[mine]) - taken
+
+
+def _significant(told: np.ndarray, needed: float, cost: Callable[[float], float]) -> float:
+    """Factor from which an effect gains what is `needed` and what it costs; what it does is proportional to it."""
+    strength = float(np.sum(told))  # sizes are logarithms: all grow alike
+    if strength <= 0:
+        return math.inf
+    factor = _SPARED / math.sqrt(strength)
+    for _ in range(_ROUNDS):
+        factor = (_SPARED + math.sqrt(2 * max(needed + cost(factor), 0.0))) / math.sqrt(strength)
+    return factor
+
+
+def _noticeable(posterior: Posterior, theta: np.ndarray, gone: np.ndarray, given: Trial) -> float:
+    """Factor from which the model as given, which lacks the effect, predicts noticeably worse on some set.
+
+    It is judged by the best of its predictions, the looser ones too: these err more by themselves, and by less where
+    something is missing.
+    """
+    left, moved = (np.array(part) for part in zip(*(_powers(posterior, theta, gone, s) for s in SLACKS), strict=True))
+    least = NOTICEABLE * given.prediction.expected + _SPARED * given.prediction.scatter
+    with np.errstate(divide="ignore", invalid="ignore"):
+        needed = np.maximum(least - (left - left[0]), 0.0) / moved
+    return math.sqrt(float(np.min(np.max(np.nan_to_num(needed, nan=math.inf, posinf=math.inf), 0))))
+
+
+def _powers(posterior: Posterior, theta: np.ndarray, gone: np.ndarray, slack: float) -> tuple[np.ndarray, np.ndarray]:
+    """Error without the effect, and how the effect moves predictions, as powers per set, (sets,) each."""
+    left, moved = [], []
+    for index, nuisances in enumerate(posterior.records):
+        use, scored = windows(nuisances)
+        there, error = (
+            posterior.innovations(values, index, use=use, noise_scales=False, slack=slack).error
+            for values in (theta, gone)
+        )
+        alive = np.asarray(nuisances.readings.use)[: nuisances.samples] > 0
+        for chosen in sets(nuisances, posterior.until[index]):
+            mask = (scored & chosen)[:, None] & alive
+            for found, readings in ((left, error), (moved, there - error)):
+                power = np.where(mask, (readings / extent(nuisances)) ** 2, 0.0)
+                found.append(np.sum(np.sum(power, 0) / np.maximum(mask.sum(0), 1)))
+    return np.array(left), np.array(moved)

@@ -18,7 +18,7 @@ from ._candidates import Candidate, candidates, chosen_causes, contained, promis
 from ._chance import beside_chance, noise_beyond, noise_levels
 from ._clipped import beside_clipping, limited
 from ._decide import Decision, decide
-from ._detectable import also_detectable
+from ._detectable import Silence, detectable, naturally_detectable
 from ._diagnosis import Diagnosis
 from ._effect import Effect
 from ._enough import hidden, settled, something_left
@@ -137,11 +137,13 @@ def diagnose(
     lacking = refitted.structure if term is None else decision.winner.structure.without(term)
     at = term.at if term is not None and term.at in lacking.links else None
     missing = residual(lacking, first, until[0], at)
-    unseen = []
+    silence = Silence(found.given, refitted, model, records, until)
+    steps.next("what would have been seen")
     if decision.verdict in ("consistent", "undecided"):  # silence is worth what would have been heard
-        steps.next("what would have been seen")
-        unseen = also_detectable([*found.left_out, *found.dropped_laws(every)], model, records, until)
-    tested = Tested(found.trials, found.behind, found.left_out, unseen, found.lack.known)
+        seen = naturally_detectable(every, silence)
+    else:
+        seen = detectable(found.trials, silence)
+    tested = Tested(found.trials, found.behind, found.left_out, seen, found.lack.known)
     leading = Leading.of(model, [refitted, *found.trials], decision.share, first, until[0])
     return assemble(decision, clipped, refitted, tested, model, extended, records, missing, gain, runs, leading)
 
@@ -160,11 +162,6 @@ class _Searched:
     @property
     def every(self) -> list[Trial]:
         return [self.given, self.refitted, *self.trials]
-
-    def dropped_laws(self, every: Sequence[Candidate]) -> list[Candidate]:
-        """Candidates of laws that were tried, and left behind."""
-        dropped = {b.effects for b in self.behind}
-        return [c for c in every if c.effects in dropped and not c.effects[0].cause.is_sensor]
 
 
 def _searched(

@@ -15,7 +15,7 @@ from ._class import class_of
 from ._clipped import finding
 from ._course import course
 from ._decide import Decision
-from ._detectable import Unseen, detectable
+from ._detectable import Smallest
 from ._diagnosis import CandidateResult, Diagnosis, Estimate, Finding, Rival
 from ._effect import Effect, names, places
 from ._gain import Gain
@@ -33,13 +33,13 @@ _NO_GAIN = "Do not change the model for the sake of its predictions: on held-out
 
 
 class Tested(NamedTuple):
-    """Candidates that were fitted, those that were only so far, those that were not, what of the latter would have been
-    seen, and what other shapes would gain beside a trial, where that was asked."""
+    """Candidates that were fitted, those that were only so far, those that were not, what would have been seen of which
+    size, and what other shapes would gain beside a trial, where that was asked."""
 
     trials: list[Trial]
     behind: list[LeftBehind]
     left_out: list[Candidate]
-    unseen: Unseen
+    seen: list[Smallest]
     unfit: Callable[[Trial], float | None]
 
 
@@ -76,7 +76,7 @@ def assemble(
     }
     notes = tuple(dict.fromkeys(note for n in records for note in n.notes))
     noise = {f"{kind} {j}": float(s) for n in records[:1] for (kind, j), s in zip(n.channels, n.floor, strict=True)}
-    smallest = _detectable(trials, tested.unseen, model, units)
+    smallest = _detectable(tested.seen, units)
     shape = None if decision.verdict == "consistent" else shape_of(missing)
     sentence, advice = _words(decision, findings, gain, shape, imposed=records[0].path is not None)
     data = {
@@ -93,7 +93,7 @@ def assemble(
         "gain": None if gain is None else _gain(gain),
         "shape": None if shape is None else {**_plain(shape._asdict()), "words": shape.words},
         "notes": list(notes),
-        "detectable": {c: {"parameter": p, "value": e.value, "unit": e.unit} for c, (p, e) in smallest.items()},
+        "detectable": {c: s.plain for c, s in smallest.items()},
         "curves": {
             "holdout": _holdout(runs),
             **curves(missing, units, decision.named_term),
@@ -102,7 +102,7 @@ def assemble(
     }
     return Diagnosis(
         verdict=decision.verdict, findings=findings, candidates=candidates, extended=extended, refitted=refit,
-        gain=gain, detectable={c: e for c, (_, e) in smallest.items()}, noise=noise, notes=notes,
+        gain=gain, detectable={c: s.size for c, s in smallest.items()}, noise=noise, notes=notes,
         sentence=sentence, advice=advice, data=data, leading=leading,
     )  # fmt: skip
 
@@ -118,19 +118,46 @@ def _unit(structure: Structure, path: str, units) -> str:
     return structure.entries()[path][0].unit(units["force"], units["displacement"])
 
 
-def _detectable(trials: list[Trial], others: Unseen, model: Structure, units) -> dict[str, tuple[str, Estimate]]:
-    """Parameter and smallest size of every cause at the place where it would have shown first."""
-    single = [t for t in trials if len(t.effects) == 1]
-    sizes = [(t.name, t.structure, detectable(t, set(model.entries()))) for t in single]
-    sizes += [(names(c.effects), structure, size) for c, structure, size in others]
-    found: dict[str, tuple[str, Estimate]] = {}
-    for name, structure, size in sizes:
-        if size is None or not math.isfinite(size[1]):
-            continue
-        path, value = size
-        if name not in found or value < found[name][1].value:
-            found[name] = (path.split(".")[-1], Estimate(value, value, value, _unit(structure, path, units)))
-    return found
+class _Shown(NamedTuple):
+    """An effect of the smallest size: its place, the name of the number that is its size, and all its numbers."""
+
+    at: tuple
+    name: str
+    effect: dict[str, Estimate]
+
+    @property
+    def size(self) -> Estimate:
+        size = abs(self.effect[self.name].value)
+        return Estimate(size, size, size, self.effect[self.name].unit)
+
+    @property
+    def plain(self) -> dict[str, Any]:
+        effect = {name: {"value": e.value, "unit": e.unit} for name, e in self.effect.items()}
+        size = {"parameter": self.name, "value": self.size.value, "unit": self.size.unit}
+        return size | {"at": list(self.at), "effect": effect}
+
+
+def _detectable(seen: list[Smallest], units) -> dict[str, _Shown]:
+    """The smallest size of every cause, at the place where it would have shown first."""
+    found: dict[str, Smallest] = {}
+    for smallest in seen:
+        cause = names(smallest.effects)
+        if cause not in found or smallest.size < found[cause].size:
+            found[cause] = smallest
+    return {cause: _shown(smallest, units) for cause, smallest in found.items()}
+
+
+def _shown(smallest: Smallest, units) -> _Shown:
+    effect = {
+        _name(path): Estimate(value, value, value, _unit(smallest.structure, path, units))
+        for path, value in smallest.numbers.items()
+    }
+    return _Shown(places(smallest.effects), _name(smallest.path), effect)
+
+
+def _name(path: str) -> str:
+    """The number's own name, of a second term of one law as well."""
+    return path.split(".")[-1].split("#")[0]
 
 
 def _estimate(t: Trial, path: str, model: Structure, units) -> Estimate:
@@ -142,7 +169,7 @@ def _values(t: Trial, which: int, model: Structure, units) -> dict[str, Estimate
     """Values of one of a trial's effects, by name."""
     own, part = set(model.entries()), t.parts[which]
     paths = [u.path for u in t.unknowns if u.path.startswith(f"{part.kind}@{part.place}.") and u.path not in own]
-    return {p.split(".")[-1].split("#")[0]: _estimate(t, p, model, units) for p in paths}
+    return {_name(p): _estimate(t, p, model, units) for p in paths}
 
 
 def _all_values(t: Trial, model: Structure, units) -> dict[str, Estimate]:

@@ -21,7 +21,7 @@ _SLIGHT = 3.0
 """
 _CHANCE = 2.0
 """Standard deviations by which noise may leave more than it does in the mean."""
-_SLACKS = (0.0, 0.01, 0.05)
+SLACKS = (0.0, 0.01, 0.05)
 """How loosely the state may be held while it is filtered; each hypothesis is judged by its best."""
 _LOST = 0.05
 """Share of a baseline's error that noise may leave of a prediction, whatever its filter says."""
@@ -160,10 +160,10 @@ def predict(posterior: Posterior, theta: np.ndarray, slight: bool = False) -> Pr
         mine = [u.path.startswith(("offset@force", "offset@acceleration")) for u in posterior.hypothesis.unknowns[0]]
         theta = np.where(mine, np.clip(theta, -_SLIGHT, _SLIGHT), theta)
     best: list[tuple[float, Prediction]] = []
-    for slack in _SLACKS:
+    for slack in SLACKS:
         errors, expected, scatter = [], [], []
         for index, nuisances in enumerate(posterior.records):
-            use, scored = _windows(nuisances)
+            use, scored = windows(nuisances)
             size = extent(nuisances)
             found = posterior.innovations(theta, index, use=use, noise_scales=False, slack=slack)
             truth = found if slack == 0 else posterior.innovations(theta, index, use=use, noise_scales=False)
@@ -176,9 +176,9 @@ def predict(posterior: Posterior, theta: np.ndarray, slight: bool = False) -> Pr
                 noise = np.sum(np.where(mask, truth.variance, 0.0), 0) / count / size**2
                 white = np.minimum(np.asarray(nuisances.readings.variance) / size**2, noise)
                 # Readings err each by itself, a state that was filtered for a whole window: in two directions.
-                windows = np.maximum(count * nuisances.record.dt / (nuisances.period * _PREDICTED), 1.0)
+                pieces = np.maximum(count * nuisances.record.dt / (nuisances.period * _PREDICTED), 1.0)
                 expected.append(np.sum(noise))
-                scatter.append(np.sqrt(np.sum(2 * white**2 / count + (noise - white) ** 2 / windows)))
+                scatter.append(np.sqrt(np.sum(2 * white**2 / count + (noise - white) ** 2 / pieces)))
         error = np.nan_to_num(np.array(errors), nan=np.inf)
         best.append((float(np.sum(error)), Prediction(error, np.array(expected), np.array(scatter))))
     return min(best, key=lambda item: item[0])[1]
@@ -192,7 +192,7 @@ def free_run(posterior: Posterior, theta: np.ndarray, index: int) -> np.ndarray:
     return np.asarray(nuisances.readings.values)[: nuisances.samples] - free.error
 
 
-def _windows(nuisances: Nuisances) -> tuple[np.ndarray, np.ndarray]:
+def windows(nuisances: Nuisances) -> tuple[np.ndarray, np.ndarray]:
     """Which samples the filter uses, and which it predicts freely: all of them along an imposed motion."""
     if nuisances.path is not None:
         return np.zeros((nuisances.samples, len(nuisances.channels))), np.ones(nuisances.samples, bool)
@@ -208,10 +208,10 @@ def extent(nuisances: Nuisances) -> np.ndarray:
     """Spread (channels,) of the readings; where a window is but a part of a slow motion, of those in a window."""
     if nuisances.period * nuisances.omega >= 2 * np.pi * (1 - 1e-9):
         return nuisances.spread
-    free = _windows(nuisances)[1]
+    free = windows(nuisances)[1]
     values = np.asarray(nuisances.readings.values)[: nuisances.samples]
-    windows = np.split(values, np.flatnonzero(np.diff(free.astype(int))) + 1)
-    about = np.concatenate([window - window.mean(0) for window in windows])
+    pieces = np.split(values, np.flatnonzero(np.diff(free.astype(int))) + 1)
+    about = np.concatenate([piece - piece.mean(0) for piece in pieces])
     return np.minimum(np.std(about[free], 0), nuisances.spread)
 
 
