@@ -11,6 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from tests.blind.drives import SumOfSines
 
 FloatArray = NDArray[np.float64]
 Drive = Callable[[Any], Any]
@@ -18,6 +21,8 @@ Side = tuple[float, ...]
 """On which side of each kink the motion is, -1 or 1; of friction also 0, where it holds."""
 
 TOLERANCE = 1e-9
+LOOKS = 4
+"""Looks per sample at the speed of a mass that slides, and at the load on one that is held."""
 MEMORY = ("bouc_wen",)
 
 
@@ -186,6 +191,9 @@ def move(
 
     `size` is a typical displacement; absolute errors are measured by it.
     """
+    still = not np.any(start)
+    if law.cause == "coulomb" and chain.mass.size == 1 and isinstance(force, SumOfSines) and base is nothing and still:
+        return slide(chain, law.parameters["F"], time, force)
     run = _Run(chain, law, force, base)
     y = np.concatenate([*start, [0.0] if law.cause in MEMORY else []])
     speed = size * chain.modes[0]
@@ -196,6 +204,8 @@ def move(
         found = solve_ivp(
             partial(run.rates, side=side), (t, float(time[-1])), y, "DOP853", time[done:],
             events=run.ends(side) or None, rtol=TOLERANCE, atol=errors,
+            # what is held has no error, and its steps would pass over what lets it go
+            max_step=(time[1] - time[0]) / LOOKS if run.held(side) else np.inf,
         )  # fmt: skip
         if found.status < 0:
             raise ArithmeticError(f"the motion cannot be continued: {found.message}")
@@ -215,3 +225,101 @@ def move(
             y[run.dof : 2 * run.dof] -= run.pull * (run.parts(y)[1] / (run.row @ run.pull))
     y = np.concatenate(states, axis=1).T
     return Motion(y[:, : run.dof], y[:, run.dof : 2 * run.dof], np.concatenate(a, axis=1).T, np.concatenate(effects))
+
+
+_AHEAD = 64
+_AT_ONCE = 4096
+_CLOSER = 17
+_ROUNDING = 1e-14
+
+
+def slide(chain: Chain, limit: float, time: FloatArray, force: SumOfSines) -> Motion:
+    """Motion of one mass on dry friction from rest: between two changes of its direction it is known in closed form."""
+    (m,), (k,), (c,) = chain.mass, chain.stiffness, chain.damping
+    swing = _Swing(float(m), float(k), float(c), force)
+    look = np.linspace(time[0], time[-1], LOOKS * (time.size - 1) + 1)
+    chunks = np.array_split(look, max(look.size // _AT_ONCE, 1))
+    x_forced, v_forced = (np.concatenate(part) for part in zip(*map(swing.forced, chunks), strict=True))
+    load = np.concatenate([force(part) for part in chunks])
+    x, v, effect = np.zeros((3, look.size))
+    dust = 1e-9 * float(time[1] - time[0])
+    here, place, done, ended = float(look[0]), 0.0, 0, True
+    side = float(np.sign(load[0])) if abs(load[0]) > limit else 0.0
+    while ended:
+        swing.let_go(here, place, -limit * side / k)
+        ended = False
+        while done < look.size and not ended:
+            ahead = slice(done, min(done + _AHEAD, look.size))
+            if side:
+                shift, rate = swing.free(look[ahead])
+                x[ahead], v[ahead], effect[ahead] = x_forced[ahead] + shift, v_forced[ahead] + rate, side * limit
+                over = np.flatnonzero((side * v[ahead] < 0) & (look[ahead] > here + dust))
+            else:
+                x[ahead], v[ahead], effect[ahead] = place, 0.0, load[ahead] - k * place
+                over = np.flatnonzero(np.abs(effect[ahead]) > limit)
+            ended = over.size > 0
+            done = done + int(over[0]) if ended else ahead.stop
+        if not ended:
+            break
+        before, after = max(here, float(look[max(done - 1, 0)])), float(look[done])
+        if side:
+            here = swing.stop(before, after, side)
+            place = swing.place(here)
+            holding = float(force(here)) - k * place
+            side = 0.0 if abs(holding) <= limit else float(np.sign(holding))
+        else:
+            side = float(np.sign(effect[done]))
+            here = _instant(partial(_beyond, force, side, limit + side * k * place), before, after)
+    a = (load - k * x - c * v - effect) / m
+    x, v, a, effect = (y[::LOOKS] for y in (x, v, a, effect))
+    return Motion(x[:, None], v[:, None], a[:, None], effect)
+
+
+class _Swing:
+    """A linear mass under a sum of sines and a constant force, let go at some place."""
+
+    def __init__(self, m: float, k: float, c: float, force: SumOfSines):
+        self.drive = force
+        self.answer = force.amplitude * np.exp(1j * force.phase) / (k - m * force.omega**2 + 1j * c * force.omega)
+        self.decay, self.omega = c / (2 * m), float(np.sqrt(k / m - (c / (2 * m)) ** 2))
+
+    def forced(self, t) -> tuple:
+        """Displacement and velocity once it has swung in, without the constant force."""
+        turned = self.answer * np.exp(1j * np.multiply.outer(t, self.drive.omega))
+        return turned.real.sum(-1), (1j * self.drive.omega * turned).real.sum(-1)
+
+    def let_go(self, here: float, place: float, aside: float) -> None:
+        """From rest at `place`; the constant force moves its rest by `aside`."""
+        x, v = self.forced(here)
+        self.here, self.aside, self.first = here, aside, place - x - aside
+        self.second = (self.decay * self.first - v) / self.omega
+
+    def free(self, t) -> tuple:
+        """What letting go and the constant force add to displacement and velocity."""
+        s = t - self.here
+        fade, cos, sin = np.exp(-self.decay * s), np.cos(self.omega * s), np.sin(self.omega * s)
+        y = fade * (self.first * cos + self.second * sin)
+        return y + self.aside, fade * self.omega * (self.second * cos - self.first * sin) - self.decay * y
+
+    def place(self, t: float) -> float:
+        return float(self.forced(t)[0] + self.free(t)[0])
+
+    def speed(self, t):
+        return self.forced(t)[1] + self.free(t)[1]
+
+    def stop(self, before: float, after: float, side: float) -> float:
+        """When its speed is zero, last before it turns against `side`."""
+        closer = np.linspace(before, after, _CLOSER)
+        onward = np.flatnonzero(side * self.speed(closer)[:-1] > 0)
+        if not onward.size:
+            return before
+        last = int(onward[-1])
+        return _instant(self.speed, float(closer[last]), float(closer[last + 1]))
+
+
+def _beyond(force: Drive, side: float, limit: float, t: float) -> float:
+    return side * float(force(t)) - limit
+
+
+def _instant(what: Callable[[float], Any], before: float, after: float) -> float:
+    return float(brentq(what, before, after, xtol=_ROUNDING))  # pyright: ignore[reportArgumentType]
