@@ -41,10 +41,8 @@ def test_dry_friction_in_closed_form_is_that_of_the_integration():
     exact = slide(one, 8.0, TIME, drive)
     found = move(one, Law("coulomb", 0, {"F": 8.0}), TIME, (np.zeros(1), np.zeros(1)), lambda t: drive(t))
     assert 0.01 < np.mean(exact.v == 0) < 0.9  # it is held now and then
-    for ours, theirs in zip(exact, found, strict=True):
-        np.testing.assert_allclose(
-            ours, theirs, atol=1e-6 * np.std(theirs)
-        )  # the integration's tolerance is 1e-9 a step
+    for ours, theirs in zip(exact, found, strict=True):  # its tolerance is 1e-9 a step
+        np.testing.assert_allclose(ours, theirs, atol=1e-6 * float(np.std(theirs)))
 
 
 @pytest.mark.parametrize("causes", [SHAKEN, LET_GO, LASTING])
