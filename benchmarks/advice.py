@@ -10,7 +10,6 @@ before; the record of that test alone then speaks for the truth by so many nats.
 
 import argparse
 import dataclasses
-import json
 import sys
 import time
 from collections.abc import Sequence
@@ -25,7 +24,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 jax.config.update("jax_enable_x64", True)
 
 import jfsm  # noqa: E402  (after double precision is on)
+from benchmarks.blind import diagnosed  # noqa: E402
 from benchmarks.blind_table import Share  # noqa: E402
+from benchmarks.rows import Row, keep, kept  # noqa: E402
 from jfsm.diagnosis._next import Proposal, separation  # noqa: E402
 from tests.blind import Challenge, draw  # noqa: E402
 from tests.blind.arrays import rms  # noqa: E402
@@ -42,8 +43,6 @@ ALIKE = (
 DRIVEN = tuple(name for name in DRIVES if name != "free_decay")
 CLOSE, APART = 3.0, 10.0
 """Difference of log-evidences [nats] of rivals, and that at which they are told apart."""
-
-Row = dict[str, Any]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,10 +61,7 @@ class Played:
 def examine(seed: int, noise: Sequence[float]) -> Row:
     """The challenge of a seed, its rivals, and what the advised test says of them."""
     challenge = draw(seed, causes=ALIKE, noise=noise, excitation=DRIVEN)
-    believed, channels = challenge.model, dict[str, Any](challenge.channels)
-    model = jfsm.Structure.sdof(mass=believed.mass, stiffness=believed.stiffness, damping=believed.damping)
-    record = jfsm.Record(challenge.time, **channels, units=challenge.units, at_rest=challenge.at_rest)
-    d = jfsm.diagnose(record, model, key=jax.random.key(seed))
+    d = diagnosed(challenge)
     row: Row = {"seed": seed, "cause": challenge.cause, "noise": challenge.noise, "excitation": challenge.excitation}
     if d.leading is None or challenge.cause not in {rival.name for rival in d.leading.rivals}:
         return row
@@ -119,16 +115,13 @@ def main() -> None:
     parser.add_argument("--noise", type=float, nargs="+", default=[0.01, 0.02, 0.05])
     parser.add_argument("--out", type=Path, help="file of JSON lines to append to and to resume from")
     given = parser.parse_args()
-    lines = given.out.read_text(encoding="utf-8").splitlines() if given.out and given.out.exists() else []
-    rows = {row["seed"]: row for row in map(json.loads, lines)}
+    rows = {row["seed"]: row for row in kept(given.out)}
     seed, close = given.seed, []
     while len(close) < given.n:
         begun = time.perf_counter()
         if seed not in rows:
             rows[seed] = examine(seed, given.noise)
-            if given.out:
-                with given.out.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(rows[seed]) + "\n")
+            keep(rows[seed], given.out)
             print(f"{told(rows[seed])}  {time.perf_counter() - begun:.0f} s", flush=True)
         close += [rows[seed]] if "after" in rows[seed] else []
         seed += 1

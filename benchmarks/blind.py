@@ -10,14 +10,8 @@ whom, calibration, gain and time as a page, and the figures as JSON beside it.
 """
 
 import argparse
-import concurrent.futures
 import dataclasses
-import json
-import multiprocessing
-import os
 import sys
-import tempfile
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -27,6 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.blind_page import write_page  # noqa: E402  (needs the line above when run as a script)
 from benchmarks.blind_table import Row, exact, hidden, said, spot, table  # noqa: E402
+from benchmarks.rows import ONE_CORE, in_processes, keep, kept  # noqa: E402
 from tests.blind import (  # noqa: E402
     CAUSES,
     CHAIN_CAUSES,
@@ -49,13 +44,6 @@ from tests.blind.plants import Plant  # noqa: E402
 HOLDOUT = 0.3
 ROWS_PER_PROCESS = 40
 """After which a process makes room for a new one: the programs that it holds grow to gigabytes."""
-ONE_CORE = {
-    "JAX_PLATFORMS": "cpu",
-    "JAX_ENABLE_X64": "1",
-    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1",
-    "OMP_NUM_THREADS": "1",
-    "OPENBLAS_NUM_THREADS": "1",
-}
 
 Drawing = dict[str, Any]
 
@@ -63,14 +51,18 @@ Drawing = dict[str, Any]
 def examine(seed: int, drawing: Drawing) -> Row:
     """The challenge of a seed put to the library, as one row; an exception becomes the row's "error"."""
     challenge = drawn(seed, drawing)
-    row = question(challenge) | {"drawing": drawing}
+    return question(challenge) | {"drawing": drawing} | attempted(lambda: diagnosed(challenge))
+
+
+def attempted(diagnose: Callable[[], Any]) -> Row:
+    """What a diagnosis says, and how long it took; one that fails must not end an examination, and says why."""
     begin = time.perf_counter()
     try:
-        said_of_it = answer(_diagnose(challenge))
-    except Exception as problem:  # one failed diagnosis must not end the examination; the table lists it
+        said_of_it = answer(diagnose())
+    except Exception as problem:
         words = f"{type(problem).__name__}: {problem}"
         said_of_it = {"verdict": "failed", "findings": [], "closed": None, "error": words}
-    return row | said_of_it | {"seconds": time.perf_counter() - begin}
+    return said_of_it | {"seconds": time.perf_counter() - begin}
 
 
 def drawn(seed: int, drawing: Drawing) -> Challenge | ChainChallenge:
@@ -146,7 +138,8 @@ def answer(diagnosis: Any) -> Row:
     }
 
 
-def _diagnose(challenge: Challenge | ChainChallenge) -> Any:
+def diagnosed(challenge: Challenge | ChainChallenge) -> Any:
+    """What is said of a challenge to the owner of its model."""
     import jax  # only in the workers, whose environment is settled before it is loaded
 
     import jfsm
@@ -171,9 +164,7 @@ def earlier_rows(path: Path, drawing: Drawing) -> list[Row]:
     ValueError
         If the file holds rows that were drawn in another way.
     """
-    if not path.exists():
-        return []
-    rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
+    rows = kept(path)
     for row in rows:
         if row["drawing"] != drawing:
             raise ValueError(
@@ -185,32 +176,7 @@ def earlier_rows(path: Path, drawing: Drawing) -> list[Row]:
 
 def answers(seeds: Sequence[int], drawing: Drawing, jobs: int) -> Iterator[Row]:
     """Rows of these seeds as they are done, from `jobs` processes of one core each."""
-    os.environ.update(ONE_CORE)  # spawned processes inherit it
-    # What one of them has compiled, the others and later calls need not compile again.
-    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(Path(tempfile.gettempdir()) / "jfsm-blind-programs"))
-    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.2")
-    context = multiprocessing.get_context("spawn")
-    pool = concurrent.futures.ProcessPoolExecutor(
-        jobs, mp_context=context, initializer=_end_with_parent, max_tasks_per_child=ROWS_PER_PROCESS
-    )
-    try:
-        waiting = [pool.submit(examine, seed, drawing) for seed in seeds]
-        for future in concurrent.futures.as_completed(waiting):
-            yield future.result()
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _end_with_parent() -> None:
-    """Lets a process of the pool end when the one that began it does, however that ends."""
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-
-    def watch() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
+    return in_processes(examine, [(seed, drawing) for seed in seeds], jobs, ROWS_PER_PROCESS, ONE_CORE)
 
 
 def progress_line(row: Row, done: int, total: int, elapsed: float) -> str:
@@ -238,9 +204,7 @@ def run(seeds: Sequence[int], drawing: Drawing, jobs: int, out: Path | None, say
     try:
         for done, row in enumerate(answers(missing, drawing, jobs) if missing else (), start=1):
             rows.append(row)
-            if out:
-                with out.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(row) + "\n")
+            keep(row, out)
             say(progress_line(row, done, len(missing), time.perf_counter() - begin))
     except KeyboardInterrupt:
         say("stopped; what is done is counted below" + (" and kept" if out else ""))

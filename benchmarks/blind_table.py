@@ -10,9 +10,10 @@ import itertools
 import math
 import statistics
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, TypeVar
+from typing import TypeVar
 
-Row = dict[str, Any]
+from benchmarks.rows import Row
+
 Counted = TypeVar("Counted")
 
 CONFIDENT = 0.9

@@ -10,7 +10,7 @@ of JSON per challenge goes to `--out`, and the same call goes on where it was st
 """
 
 import argparse
-import json
+import dataclasses
 import sys
 import time
 from collections.abc import Sequence
@@ -24,8 +24,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 jax.config.update("jax_enable_x64", True)
 
 import jfsm  # noqa: E402  (after double precision is on)
-from benchmarks.blind import HOLDOUT  # noqa: E402
+from benchmarks.blind import diagnosed  # noqa: E402
 from benchmarks.blind_table import Share  # noqa: E402
+from benchmarks.rows import Row, keep, kept  # noqa: E402
 from tests.blind import Challenge, draw  # noqa: E402
 from tests.blind.arrays import rms  # noqa: E402
 from tests.blind.challenge import (  # noqa: E402
@@ -46,14 +47,12 @@ TARGETS = {"stated": "80 % at least", "third": "30 % at most"}
 SHAPES = frozenset("gap knot side v_s n beta gamma slip tau omega zeta phase x0 t_ref t_star s".split())
 """Numbers of a law that do not grow with its size."""
 
-Row = dict[str, Any]
-
 
 def examine(seed: int, noise: Sequence[float]) -> Row:
     """The silent challenge of a seed, and what is said of it with an effect of the stated size and of a third of it."""
     challenge = draw(seed, causes="none", noise=noise)
     row: Row = {name: getattr(challenge, name) for name in ("seed", "noise", "channel_set", "excitation")}
-    silent = diagnosed(challenge, challenge.channels, at_rest=challenge.at_rest)
+    silent = diagnosed(challenge)
     row["verdict"] = silent.verdict
     known = {cause: said for cause, said in silent.data["detectable"].items() if cause in LAWS or cause in SENSORS}
     if silent.verdict not in ("consistent", "undecided") or not known:
@@ -67,17 +66,9 @@ def examine(seed: int, noise: Sequence[float]) -> Row:
             clean, at_rest = affected(challenge, cause, known[cause], share)
         except EscapeError as escape:
             return row | {"escape": str(escape)}
-        readings = with_noise(rng, clean, challenge.noise)
-        row[name] = outcome(diagnosed(challenge, readings, at_rest=at_rest), cause)
+        shown = dataclasses.replace(challenge, channels=with_noise(rng, clean, challenge.noise), at_rest=at_rest)
+        row[name] = outcome(diagnosed(shown), cause)
     return row
-
-
-def diagnosed(challenge: Challenge, channels: Channels, *, at_rest: bool) -> jfsm.Diagnosis:
-    """What is said of these channels by the owner of the model."""
-    believed, shown = challenge.model, dict[str, Any](channels)
-    model = jfsm.Structure.sdof(mass=believed.mass, stiffness=believed.stiffness, damping=believed.damping)
-    record = jfsm.Record(challenge.time, **shown, units=challenge.units, at_rest=at_rest)
-    return jfsm.diagnose(record, model, holdout=HOLDOUT, key=jax.random.key(challenge.seed))
 
 
 def affected(challenge: Challenge, cause: str, said: dict[str, Any], share: float) -> tuple[Channels, bool]:
@@ -159,17 +150,14 @@ def main() -> None:
     parser.add_argument("--noise", type=float, nargs="+", default=list(NOISE_LEVELS))
     parser.add_argument("--out", type=Path, help="file of JSON lines to append to and to resume from")
     given = parser.parse_args()
-    lines = given.out.read_text(encoding="utf-8").splitlines() if given.out and given.out.exists() else []
-    rows = {row["seed"]: row for row in map(json.loads, lines)}
+    rows = {row["seed"]: row for row in kept(given.out)}
     wanted = range(given.seed, given.seed + given.n)
     for seed in wanted:
         if seed in rows:
             continue
         begun = time.perf_counter()
         rows[seed] = examine(seed, given.noise)
-        if given.out:
-            with given.out.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(rows[seed]) + "\n")
+        keep(rows[seed], given.out)
         print(f"{told(rows[seed])}  {time.perf_counter() - begun:.0f} s", flush=True)
     print(summary([rows[seed] for seed in wanted]))
 

@@ -11,7 +11,6 @@ goes on where it was stopped.
 
 import argparse
 import concurrent.futures
-import json
 import math
 import multiprocessing
 import os
@@ -25,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import numpy as np  # noqa: E402  (needs the line above when run as a script)
 
-from benchmarks.blind import ONE_CORE  # noqa: E402
+from benchmarks.rows import ONE_CORE, Row, keep, kept  # noqa: E402
 from tests.blind import Challenge, draw  # noqa: E402
 
 NOT_FITTED = ("none", "stiffness_value", "damping_value", "mass_value", "clipping")
@@ -34,8 +33,6 @@ BEHIND = 1.0
 
 APART = 0.5
 """Standard errors between the two fits up to which they are at one top."""
-
-Row = dict[str, Any]
 
 _COMPILING: list[float] = []
 """Seconds that this process has traced and compiled, once it counts them."""
@@ -176,9 +173,7 @@ def main() -> None:
     parser.add_argument("--excitation", nargs="+", default=list(DRIVES), choices=list(DRIVES))
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
-    rows: list[Row] = []
-    if given.out.exists():
-        rows = [json.loads(line) for line in given.out.read_text(encoding="utf-8").splitlines() if line.strip()]
+    rows = kept(given.out)
     done = {(row["cause"], row["seed"]) for row in rows}
     wanted = [(c, s) for s in range(given.seed, given.seed + given.n) for c in given.causes if (c, s) not in done]
     os.environ.update(ONE_CORE)  # spawned processes inherit it
@@ -189,8 +184,7 @@ def main() -> None:
         for count, future in enumerate(concurrent.futures.as_completed(waiting), 1):
             row = future.result()
             rows.append(row)
-            with given.out.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row) + "\n")
+            keep(row, given.out)
             words = (
                 row.get("error") or f"behind {row['behind']:.2f}, {sum(covered(row))} of {len(covered(row))} covered"
             )

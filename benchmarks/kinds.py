@@ -10,14 +10,9 @@ was stopped.
 """
 
 import argparse
-import concurrent.futures
-import json
-import multiprocessing
-import os
 import resource
 import statistics
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -28,9 +23,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from benchmarks.blind import ONE_CORE, answer  # noqa: E402  (needs the line above when run as a script)
+from benchmarks.blind import attempted  # noqa: E402  (needs the line above when run as a script)
 from benchmarks.blind_table import Row, Share, in_class, right_family, said  # noqa: E402
 from benchmarks.chains import Chain, Drive, FloatArray, Law, Motion, move, nothing  # noqa: E402
+from benchmarks.rows import DOUBLE_ON_CPU, ONE_CORE, in_processes, keep, kept  # noqa: E402
 from tests.blind.drives import draw_harmonic, draw_noise, draw_sweep  # noqa: E402
 
 HOLDOUT = 0.3
@@ -256,15 +252,10 @@ def examine(kind: str, seed: int) -> Row:
     record = one.channels["record"] if "record" in one.channels else jfsm.Record(**one.channels)
     model = jfsm.Structure.chain(**one.model) if isinstance(one.model, dict) else one.model
     row = {"kind": kind, "seed": seed, "cause": one.cause, "at": list(one.at), "samples": len(record), **one.more}
-    begin, cpu = time.perf_counter(), time.process_time()
-    try:
-        said_of_it = answer(jfsm.diagnose(record, model, holdout=HOLDOUT, key=jax.random.key(seed)))
-    except Exception as problem:  # one failed diagnosis must not end the examination; the table lists it
-        words = f"{type(problem).__name__}: {problem}"
-        said_of_it = {"verdict": "failed", "findings": [], "closed": None, "error": words}
-    spent = {"seconds": time.perf_counter() - begin, "cpu_seconds": time.process_time() - cpu}
+    begin = time.process_time()
+    row |= attempted(lambda: jfsm.diagnose(record, model, holdout=HOLDOUT, key=jax.random.key(seed)))
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024  # KiB on Linux
-    return row | said_of_it | spent | {"megabytes": peak}
+    return row | {"cpu_seconds": time.process_time() - begin, "megabytes": peak}
 
 
 def right(row: Row) -> bool:
@@ -313,22 +304,9 @@ def table(rows: Sequence[Row]) -> str:
     return "\n".join(out + (["not right", *(f"  {one}" for one in wrong)] if wrong else []))
 
 
-def earlier_rows(path: Path | None) -> list[Row]:
-    if path is None or not path.exists():
-        return []
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
-
-
 def answers(wanted: Sequence[tuple[str, int]], jobs: int) -> Iterator[Row]:
     """Rows as they are done, each from a process of its own, whose memory is that of one diagnosis."""
-    os.environ.update(ONE_CORE if jobs > 1 else {name: ONE_CORE[name] for name in ("JAX_PLATFORMS", "JAX_ENABLE_X64")})
-    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(Path(tempfile.gettempdir()) / "jfsm-blind-programs"))
-    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.2")
-    context = multiprocessing.get_context("spawn")
-    with concurrent.futures.ProcessPoolExecutor(jobs, mp_context=context, max_tasks_per_child=1) as pool:
-        waiting = [pool.submit(examine, kind, seed) for kind, seed in wanted]
-        for future in concurrent.futures.as_completed(waiting):
-            yield future.result()
+    return in_processes(examine, wanted, jobs, 1, ONE_CORE if jobs > 1 else DOUBLE_ON_CPU)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -340,14 +318,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--out", type=Path, help="file of JSON lines to append to and to resume from")
     given = parser.parse_args(arguments)
     wanted = [(kind, seed) for kind in given.kind for seed in range(given.seed, given.seed + given.n)]
-    rows = [row for row in earlier_rows(given.out) if (row["kind"], row["seed"]) in wanted]
+    rows = [row for row in kept(given.out) if (row["kind"], row["seed"]) in wanted]
     done = {(row["kind"], row["seed"]) for row in rows}
     try:
         for row in answers([one for one in wanted if one not in done], given.jobs):
             rows.append(row)
-            if given.out:
-                with given.out.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(row) + "\n")
+            keep(row, given.out)
             print(line(row), flush=True)
     except KeyboardInterrupt:
         print("stopped; what is done is counted below" + (" and kept" if given.out else ""))

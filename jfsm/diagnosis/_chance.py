@@ -18,7 +18,7 @@ from ..records import Record
 from ..structures import Clipping, Structure
 from ._adequacy import adequate, white
 from ._gain import remeasured
-from ._trial import Prediction, Trial, extent, free_run, predict, sets
+from ._trial import Prediction, Trial, ended, extent, free_run, predict, sets
 
 _DRAWS = 6
 
@@ -71,8 +71,7 @@ def noise_beyond(trials: Sequence[Trial], records: Sequence[Nuisances], until: S
 
 def noise_levels(trial: Trial, nuisances: Nuisances, index: int = 0) -> dict[tuple, float]:
     """Standard deviation of every channel's noise in record `index`: of responses as fitted, of forces at its floor."""
-    fitted = zip(trial.unknowns, trial.theta, strict=True)
-    scales = {u.path: float(theta) for u, theta in fitted if u.record in (None, index)}
+    scales = {u.path: theta for u, theta in ended(trial) if u.record in (None, index)}
     levels = {
         channel: float(floor) * math.exp(scales.get(f"noise@{c}", 0.0) / 2)
         for c, (channel, floor) in enumerate(zip(nuisances.channels, nuisances.floor, strict=True))

@@ -29,7 +29,7 @@ from ..structures import Structure
 from ._adequacy import NOTICEABLE, SIGNIFICANT
 from ._candidates import Candidate, hypothesis, modest
 from ._effect import Effect
-from ._trial import SLACKS, Trial, extent, sets, windows
+from ._trial import SLACKS, Trial, ended, extent, sets, windows
 
 _SPARED = 1.28
 """Standard deviations of chance that an effect has to spare: nine of ten then pass."""
@@ -76,8 +76,7 @@ class Silence(NamedTuple):
     @property
     def nuisances(self) -> dict[tuple[str, int | None], float]:
         """Those of every record, by path and record, as fitted beside the model as given."""
-        found = zip(self.given.unknowns, self.given.theta, strict=True)
-        return {(u.path, u.record): float(theta) for u, theta in found if u.record is not None}
+        return {(u.path, u.record): theta for u, theta in ended(self.given) if u.record is not None}
 
 
 def detectable(trials: Sequence[Trial], silence: Silence) -> list[Smallest]:

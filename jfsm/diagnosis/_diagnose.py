@@ -102,7 +102,7 @@ def diagnose(
     stated = model
     for sensor in clipped:
         model = model + sensor
-    steps = _Steps(progress, 4)
+    steps = _Steps(progress, 5)
 
     steps.next("the model as given and refitted")
     records, until, given, refitted = _believed(training, model, reconstruction)

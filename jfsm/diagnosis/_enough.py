@@ -9,7 +9,7 @@ from ..structures import AccelerationBias, AccelerationGain, ForceGain, Preload
 from ._adequacy import NEARLY_ALL, NEGLIGIBLE, SIGNIFICANT, adequate, almost_all, explained
 from ._doubt import UNFIT, UNFIT_SHARE
 from ._lack_of_fit import Unfit
-from ._trial import Trial, own_values
+from ._trial import Trial, ended, own_values
 
 WORTH_A_SECOND = 0.03
 """Share of the refit's error by which two effects must predict better than either of them alone."""
@@ -47,7 +47,7 @@ def hidden(trials: Sequence[Trial]) -> tuple[type, ...]:
         return ()
     found: list[type] = [ForceGain, AccelerationGain] if strain(best) > SIGNIFICANT else []
     for kind, effect in (("force", Preload), ("acceleration", AccelerationBias)):
-        offsets = [(u, theta) for u, theta in _valued(best) if u.path.startswith(f"offset@{kind}-")]
+        offsets = [(u, theta) for u, theta in ended(best) if u.path.startswith(f"offset@{kind}-")]
         found += [effect] if _cost(offsets) > SIGNIFICANT else []
     return tuple(found)
 
@@ -55,10 +55,6 @@ def hidden(trials: Sequence[Trial]) -> tuple[type, ...]:
 def strain(trial: Trial) -> float:
     """Nats that a trial's own values cost beside those stated."""
     return _cost(own_values(trial))
-
-
-def _valued(trial: Trial) -> list[tuple[Unknown, float]]:
-    return [(u, float(theta)) for u, theta in zip(trial.unknowns, trial.theta, strict=True)]
 
 
 def _cost(values: Sequence[tuple[Unknown, float]]) -> float:

@@ -137,9 +137,14 @@ class Trial:
         return u.value(t), ends[0], ends[1]
 
 
+def ended(t: Trial) -> list[tuple[Unknown, float]]:
+    """A trial's unknowns, and where they ended."""
+    return [(u, float(theta)) for u, theta in zip(t.unknowns, t.theta, strict=True)]
+
+
 def own_values(t: Trial) -> list[tuple[Unknown, float]]:
     """The model's own values among a trial's unknowns, and where they ended."""
-    return [(u, float(theta)) for u, theta in zip(t.unknowns, t.theta, strict=True) if math.isfinite(u.degrees)]
+    return [(u, theta) for u, theta in ended(t) if math.isfinite(u.degrees)]
 
 
 def sets(nuisances: Nuisances, until: int) -> list[np.ndarray]:

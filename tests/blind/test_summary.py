@@ -325,7 +325,7 @@ def test_in_a_chain_a_line_tells_the_places():
 
 
 def test_the_causes_are_hidden_in_a_chain_where_the_drawing_says_so(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(blind, "_diagnose", lambda challenge: diagnosis(None))
+    monkeypatch.setattr(blind, "diagnosed", lambda challenge: diagnosis(None))
     drawing = {"causes": ["force_gain"], "excitation": ["harmonic"], "channels": ["xx"], "chain": True}
     result = blind.examine(0, drawing)
     assert result["drawing"] == drawing and json.loads(json.dumps(result)) == result
@@ -375,7 +375,7 @@ def test_a_diagnosis_that_fails_becomes_a_row_with_its_error(monkeypatch: pytest
     def broken(challenge):
         raise ValueError("no such thing")
 
-    monkeypatch.setattr(blind, "_diagnose", broken)
+    monkeypatch.setattr(blind, "diagnosed", broken)
     result = blind.examine(0, {"causes": ["force_gain"], "excitation": ["harmonic"]})
     assert (result["verdict"], result["error"], result["cause"]) == (
         "failed",
@@ -387,7 +387,7 @@ def test_a_diagnosis_that_fails_becomes_a_row_with_its_error(monkeypatch: pytest
 
 
 def test_two_of_the_causes_are_hidden_where_the_drawing_says_so(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(blind, "_diagnose", lambda challenge: diagnosis(None))
+    monkeypatch.setattr(blind, "diagnosed", lambda challenge: diagnosis(None))
     drawing = {"causes": ["preload", "accel_bias", "none"], "excitation": ["harmonic"], "two": True}
     result = blind.examine(0, drawing)
     assert (result["cause"], result["beside"]["cause"]) == ("preload", "accel_bias")
