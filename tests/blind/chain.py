@@ -416,10 +416,6 @@ class ChainChallenge:
     motion: ChainMotion
 
     @property
-    def causes(self) -> tuple[str, ...]:
-        return (self.cause,)
-
-    @property
     def noise_floor(self) -> dict[Place, float]:
         """Rms of the noise that was put on each channel, in its unit."""
         clean = by_place(self.clean)

@@ -285,14 +285,9 @@ def _fair_question(rng: np.random.Generator, cause: str, excitation: str) -> tup
             return plant, drive, start, NoLaw(), integrate(plant, NoLaw(), drive, start, time, scale)
         if cause in NEEDS_REST:
             start = (0.0, 0.0)
-
-        def sketched(law: Law, start=start, bench=(plant, drive, time, limit)) -> Motion:
-            plant, drive, time, limit = bench
-            return sketch(plant, law, drive, start, time, limit)
-
         for _ in range(20):
             try:
-                law = sized(rng, kind, Scene(plant, drive, plain), kind.shares, sketched)
+                law = _sized(rng, kind, Scene(plant, drive, plain), start, limit)
                 begin = law.start(*start, plant.stiffness)
                 motion = trusted_motion(plant, law, drive, begin, time, scale, limit)
             except EscapeError:
@@ -356,6 +351,12 @@ def draw_motion(
     x, v = rng.standard_normal(2)
     start = (0.0, 0.0) if rng.random() < 0.8 else (float(size * x), float(size * plant.omega * v))
     return drive, start, sketch(plant, NoLaw(), drive, start, time)
+
+
+def _sized(rng: np.random.Generator, kind: type[Law], scene: Scene, start: State, limit: float) -> Law:
+    """A law of the size that is wanted, for one mass; raises what `sized` does."""
+    plant, drive, time = scene.plant, scene.drive, scene.motion.time
+    return sized(rng, kind, scene, kind.shares, lambda law: sketch(plant, law, drive, start, time, limit))
 
 
 def sized(
