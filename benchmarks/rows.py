@@ -37,21 +37,22 @@ def keep(row: Row, path: Path | None) -> None:
 def in_processes(
     examine: Callable[..., Row], calls: Iterable[tuple], jobs: int, lasting: int, environment: Mapping[str, str]
 ) -> Iterator[Row]:
-    """Rows of all calls as they are done, from `jobs` processes, each of which ends after `lasting` rows."""
+    """Rows of all calls as they are done, from `jobs` processes, that end when each has done about `lasting`."""
     os.environ.update(environment)  # spawned processes inherit it
     # What one of them has compiled, the others and later calls need not compile again.
     os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(Path(tempfile.gettempdir()) / "jfsm-blind-programs"))
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.2")
-    context = multiprocessing.get_context("spawn")
-    pool = concurrent.futures.ProcessPoolExecutor(
-        jobs, mp_context=context, initializer=_end_with_parent, max_tasks_per_child=lasting
-    )
-    try:
-        waiting = [pool.submit(examine, *call) for call in calls]
-        for future in concurrent.futures.as_completed(waiting):
-            yield future.result()
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+    calls, lot = list(calls), lasting * jobs
+    for first in range(0, len(calls), lot):
+        # A new pool for every lot: one that replaces its processes one by one may wait for ever (CPython 115634).
+        context = multiprocessing.get_context("spawn")
+        pool = concurrent.futures.ProcessPoolExecutor(jobs, mp_context=context, initializer=_end_with_parent)
+        try:
+            waiting = [pool.submit(examine, *call) for call in calls[first : first + lot]]
+            for future in concurrent.futures.as_completed(waiting):
+                yield future.result()
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
 
 
 def _end_with_parent() -> None:

@@ -270,3 +270,22 @@ def test_records_of_similar_length_share_the_programs_that_place_a_law(caplog):
     large = ("_along_each", "_likelihoods", "_smooth", "force_along")
     assert not [m for m in caplog.messages if m.startswith("Compiling") and any(name in m for name in large)]
     assert second[0].share == pytest.approx(first[0].share, abs=0.05)
+
+
+@pytest.mark.parametrize("late", ["force", "displacement"])
+def test_no_force_is_missing_where_a_channel_is_late_as_the_model_says(late):
+    delay = 0.2
+
+    def motion(t, y):
+        return [y[1], drive(t) - 9.0 * y[0] - 0.3 * y[1]]
+
+    x = solve_ivp(motion, (0, T[-1]), [0.0, 0.0], dense_output=True, rtol=1e-10, atol=1e-12).sol
+    seen = {kind: np.maximum(T - delay * (kind == late), 0.0) for kind in ("force", "displacement")}
+    shown = {"force": drive(seen["force"]), "displacement": x(seen["displacement"])[0]}
+    rng = np.random.default_rng(2)
+    r = jfsm.Record(T, **{kind: y + 0.01 * np.std(y) * rng.standard_normal(T.size) for kind, y in shown.items()})
+    law = jfsm.ForceDelay if late == "force" else jfsm.ChannelDelay
+    believed, mended = (missing_force(m, prepare(r, m)) for m in (MODEL, MODEL + law(delay, at=(late, 1))))
+    inner, whole = slice(50, -50), np.std(drive(T))
+    assert np.std(believed.force[inner]) > 0.3 * whole
+    assert np.std(mended.force[inner]) < 0.05 * whole

@@ -20,7 +20,7 @@ from scipy.ndimage import maximum_filter1d
 
 from ..dynamics._along import force_along
 from ..dynamics._excitation import bucket
-from ..dynamics._grid import Fine
+from ..dynamics._grid import Fine, punctual, shifted
 from ..dynamics._plant import Plant, Readout
 from ._kalman import LinearModel, log_likelihood, smoothed
 
@@ -70,7 +70,7 @@ def latent_force(
     Parameters
     ----------
     plant : Plant
-        With its sensors' gains and offsets.
+        With its sensors' gains, offsets and delays.
     fine : Fine
         What drives the record, at least as long as the readings.
     values, use : (n, channels) arrays
@@ -83,9 +83,12 @@ def latent_force(
     padded = min(bucket(n), fine.time.shape[0])  # nothing is read where it is filled up
     values, use = (np.pad(np.asarray(q), ((0, padded - n), (0, 0))) for q in (values, use))
     base = np.asarray(fine.base)[:padded]
-    true = (np.asarray(fine.force)[:padded] - np.asarray(plant.force_offset)) / (1 + np.asarray(plant.force_gain))
+    true = (np.asarray(punctual(plant, fine).force)[:padded] - np.asarray(plant.force_offset)) / (
+        1 + np.asarray(plant.force_gain)
+    )
     true = true - base[..., None] * np.asarray(plant.mass).sum(1)
     seen = (values - np.asarray(plant.channel_offset)) / (1 + np.asarray(plant.channel_gain))
+    seen, use = _on_time(plant, seen, use, dt)
     acceleration = np.array([kind == "acceleration" for kind in show.kinds])
     seen = seen - base[:, :1] * acceleration
     models = [
@@ -115,6 +118,18 @@ def latent_force(
     period = max(int(2 * np.pi / (omega * dt)), 1)
     moves = maximum_filter1d(np.abs(v), period, axis=0) > _CERTAIN * std[:, dof : 2 * dof]
     return Latent(x, v, r - known, std[:, 2 * dof :], np.any(moves, 1))
+
+
+def _on_time(plant: Plant, seen: np.ndarray, use: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
+    """Readings with their channels' delays undone, and which of them count: those with four that do around them."""
+    seen, use = np.array(seen), np.array(use)
+    for tau, channel in zip(np.asarray(plant.channel_delay), np.asarray(plant.late_channel), strict=True):
+        seen[:, channel] = shifted(jnp.asarray(seen[:, channel]), jnp.asarray(tau / dt))
+        index = np.arange(len(use)) + int(np.floor(tau / dt))
+        near = index[:, None] + np.arange(-1, 3)
+        inside = (near >= 0) & (near < len(use))
+        use[:, channel] = np.min(np.where(inside, use[np.clip(near, 0, len(use) - 1), channel], 0.0), 1)
+    return seen, use
 
 
 def _model(
