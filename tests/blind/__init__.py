@@ -4,10 +4,10 @@ Nothing here knows the library: laws, sensors and the integrator are written a s
 that an error made in the library cannot be made in its examination as well.
 """
 
-from .chain import CHAIN_CAUSES as CHAIN_CAUSES
-from .chain import CHAIN_SETS as CHAIN_SETS
-from .chain import ChainChallenge as ChainChallenge
-from .chain import draw_chain as draw_chain
+from .chain_challenge import CHAIN_CAUSES as CHAIN_CAUSES
+from .chain_challenge import CHAIN_SETS as CHAIN_SETS
+from .chain_challenge import ChainChallenge as ChainChallenge
+from .chain_challenge import draw_chain as draw_chain
 from .challenge import CAUSES as CAUSES
 from .challenge import FIRST_CAUSES as FIRST_CAUSES
 from .challenge import Challenge as Challenge

@@ -10,23 +10,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
-from . import CHAIN_CAUSES, CHAIN_SETS, ChainChallenge, draw_chain
-from . import chain as chain_module
+from . import CHAIN_CAUSES, CHAIN_SETS, ChainChallenge, chain_challenge, draw_chain
 from .arrays import FloatArray, rms
-from .chain import (
-    HANGS,
-    LEAST_SEEN,
-    RATIOS,
-    REST,
-    THIRD_LINKS,
-    Chain,
-    across,
-    by_place,
-    chain_can_tell,
-    integrate,
-    responses,
-    sketch,
-)
+from .chain import REST, Chain, across, integrate, responses, sketch
+from .chain_challenge import HANGS, LEAST_SEEN, RATIOS, THIRD_LINKS, by_place, chain_can_tell
 from .challenge import LEAST_LEFT, SAMPLES, sized
 from .drives import Silence
 from .laws import LAWS, NoLaw, Scene
@@ -109,7 +96,7 @@ def values(chain: Chain) -> dict[tuple[str | int, ...], float]:
 
 
 def test_chains_have_two_modes_not_far_apart_and_samples_enough_for_both():
-    plants = [chain_module._drawn_plant(np.random.default_rng(seed), "coulomb") for seed in range(200)]
+    plants = [chain_challenge._drawn_plant(np.random.default_rng(seed), "coulomb") for seed in range(200)]
     ratios = [chain.omega[1] / chain.omega[0] for chain, _ in plants]
     assert RATIOS[0] <= min(ratios) < 1.7 and 2.8 < max(ratios) <= RATIOS[1]
     for chain, time in plants:
@@ -227,13 +214,14 @@ def test_a_sketch_is_near_the_motion(cause: str):
 
 def test_a_law_whose_start_is_elsewhere_begins_with_its_own_link_alone_stretched():
     assert not any(
-        (0, 2) in chain_module._drawn_plant(np.random.default_rng(seed), "double_well")[0].links for seed in range(20)
+        (0, 2) in chain_challenge._drawn_plant(np.random.default_rng(seed), "double_well")[0].links
+        for seed in range(20)
     )
     chain = Chain((1.0, 1.0), {(0, 1): 100.0, (1, 2): 150.0}, {(0, 1): 0.3, (1, 2): 0.3})
-    first, second = (chain_module._begun(chain, at, DoubleWell(k_neg=200.0, k3=50.0), REST) for at in chain.links)
+    first, second = (chain_challenge._begun(chain, at, DoubleWell(k_neg=200.0, k3=50.0), REST) for at in chain.links)
     assert first == ((pytest.approx(np.sqrt(2.0)), pytest.approx(np.sqrt(2.0))), (0.0, 0.0))
     assert second == ((0.0, pytest.approx(1.0)), (0.0, 0.0))
-    assert chain_module._begun(chain, (1, 2), Coulomb(F=1.0), ((0.1, 0.3), (1.0, 2.0))) == ((0.1, 0.3), (1.0, 2.0))
+    assert chain_challenge._begun(chain, (1, 2), Coulomb(F=1.0), ((0.1, 0.3), (1.0, 2.0))) == ((0.1, 0.3), (1.0, 2.0))
 
 
 # what a record shows
@@ -257,14 +245,14 @@ def test_what_other_values_would_be_is_not_seen():
     challenge = drawn("cubic_hardening")
     motion, at = challenge.motion, link_of(challenge)
     kinds = [(kind, mass) for kind in motion.responses for mass in (1, 2)]
-    bench = chain_module._Bench(
+    bench = chain_challenge._Bench(
         challenge.truth, challenge.time, challenge.driven, challenge.drive, challenge.start,
         (("force", challenge.driven), *kinds),
     )  # fmt: skip
 
     def seen(effect: FloatArray) -> float:
         changed = dataclasses.replace(motion, link=dataclasses.replace(motion.link, effect=effect))
-        return chain_module._seen(bench, at, changed, "cubic_hardening")
+        return chain_challenge._seen(bench, at, changed, "cubic_hardening")
 
     d, w, k = motion.link.x, motion.link.v, challenge.truth.stiffness[at]
     linear = 0.2 * k * d - 0.1 * k * rms(d) / rms(w) * w
@@ -277,9 +265,9 @@ def test_a_late_force_is_stable_if_both_modes_decay():
     chain = Chain((1.0, 1.0), {(0, 1): 100.0, (1, 2): 150.0}, {(0, 1): 0.3, (1, 2): 0.3})
     for at in chain.links:
         # A short delay is a damper of -k tau.
-        assert not chain_module._is_stable(chain, at, DelayedForce(k=20.0, tau=0.03))
-        assert chain_module._is_stable(chain, at, DelayedForce(k=-20.0, tau=0.03))
-        assert chain_module._is_stable(chain, at, DelayedForce(k=20.0, tau=0.005))
+        assert not chain_challenge._is_stable(chain, at, DelayedForce(k=20.0, tau=0.03))
+        assert chain_challenge._is_stable(chain, at, DelayedForce(k=-20.0, tau=0.03))
+        assert chain_challenge._is_stable(chain, at, DelayedForce(k=20.0, tau=0.005))
 
 
 # sensors, beliefs and noise
@@ -349,7 +337,7 @@ def test_a_wrong_value_is_wrong_by_itself_and_by_the_promised_amount(cause: str)
 
 def test_beside_an_effect_each_link_is_exact_or_close():
     rng, chain = np.random.default_rng(0), drawn("maxwell").truth
-    beliefs = [chain_module._roughly_known(rng, chain) for _ in range(200)]
+    beliefs = [chain_challenge._roughly_known(rng, chain) for _ in range(200)]
     for at in chain.links:
         exact = sum(belief.stiffness[at] == chain.stiffness[at] for belief in beliefs)
         off = [abs(belief.stiffness[at] / chain.stiffness[at] - 1.0) for belief in beliefs]
@@ -407,7 +395,7 @@ def test_a_law_that_never_gives_a_fair_question_is_reported(monkeypatch: pytest.
     def unfair(*arguments: object) -> None:
         raise EscapeError("too large")
 
-    monkeypatch.setattr(chain_module, "_drawn_law", unfair)
+    monkeypatch.setattr(chain_challenge, "_drawn_law", unfair)
     with pytest.raises(RuntimeError, match="no fair coulomb under harmonic in 100 chains"):
         draw_chain(0, causes="coulomb", excitation="harmonic")
 
