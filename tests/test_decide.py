@@ -208,7 +208,7 @@ def test_a_law_is_not_named_only_because_own_values_would_be_far_off_without_it(
     assert decision.verdict == verdict
 
 
-@pytest.mark.parametrize(("behind", "named"), [(0.5, "coulomb"), (1.5, "coulomb_asymmetric")])
+@pytest.mark.parametrize(("behind", "named"), [(0.05, "coulomb"), (0.5, "coulomb_asymmetric")])
 def test_numbers_that_a_record_does_not_show_are_not_named(behind: float, named: str):
     general, special = trial(9000.0, 0.0, "coulomb_asymmetric"), trial(9000.0 - behind, 0.0, "coulomb")
     general.laws, special.laws = (jfsm.CoulombAsymmetric(1.0, 1.1, at=(0, 1)),), (jfsm.Coulomb(1.0, at=(0, 1)),)

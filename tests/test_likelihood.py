@@ -14,6 +14,7 @@ from jfsm.identification import (
     Posterior,
     _likelihood,
     effect_unknown,
+    interval,
     nuisance_unknowns,
     own_unknown,
     prepare,
@@ -82,7 +83,7 @@ def somewhere(posterior: Posterior) -> np.ndarray:
     return start + 0.02 * np.random.default_rng(3).standard_normal(start.shape)
 
 
-@pytest.mark.parametrize("kind", ["smooth", "friction"])
+@pytest.mark.parametrize("kind", ["smooth", "friction", "power"])
 def test_the_gradient_is_that_of_the_value(kind, request):
     posterior: Posterior = request.getfixturevalue(kind)
     theta = somewhere(posterior)
@@ -239,3 +240,47 @@ def test_the_start_is_first_guessed_from_what_is_measured(chain_nuisances):
     first = np.asarray(chain_nuisances.readings.values)[0]
     shown = [first[i] for i, (kind, _) in enumerate(chain_nuisances.channels) if kind == "displacement"]
     np.testing.assert_array_equal(chain_nuisances.x0, shown)
+
+
+POWER = ("power_damping@0-1.c", "power_damping@0-1.n")
+
+
+@pytest.fixture(scope="module")
+def power(single_nuisances) -> Posterior:
+    structure = SINGLE + jfsm.PowerDamping(0.4, 1.5, at=(0, 1))
+    unknowns = tuple(effect_unknown(structure, path, single_nuisances) for path in POWER)
+    return Posterior(Hypothesis((structure,), (unknowns,)), [single_nuisances])
+
+
+def test_a_coefficient_follows_its_exponent_so_that_the_force_at_a_typical_speed_stays(power, single_nuisances):
+    speed, theta = single_nuisances.length * single_nuisances.omega, power.initial()[0]
+    for n in (0.7, 1.5, 3.0):
+        law = power.structure(np.array([theta[0], np.log(n / 1.5)])).terms[-1]
+        assert float(law.n) == pytest.approx(n)
+        assert float(law.c * speed**law.n) == pytest.approx(0.4 * speed**1.5)
+
+
+def test_a_law_whose_coefficient_follows_its_exponent_is_as_likely_as_with_the_same_numbers_by_themselves(
+    power, single_nuisances
+):
+    theta = power.initial()[0] + np.array([0.3, -0.2])
+    structure = power.structure(theta)
+    known = Hypothesis((structure,), ((own_unknown(structure, "mass@1", {}),),))
+    alone = Posterior(known, [single_nuisances])
+    here, there = theta[None], alone.initial()
+    values = [
+        float(posterior.evaluate(at)[0][0]) - prior(posterior.hypothesis.unknowns[0], at[0])[0]
+        for posterior, at in ((power, here), (alone, there))
+    ]
+    assert values[0] == pytest.approx(values[1], rel=1e-9)
+
+
+def test_the_interval_of_a_coefficient_holds_what_is_not_known_of_its_exponent(power):
+    unknowns, theta = power.hypothesis.unknowns[0], power.initial()[0]
+    covariance = np.array([[0.01, 0.004], [0.004, 0.0025]])
+    drawn = np.random.default_rng(0).multivariate_normal(theta, covariance, 100_000)
+    exponent = unknowns[1].unit * np.exp(drawn[:, 1])
+    coefficient = unknowns[0].unit * np.exp(drawn[:, 0] + unknowns[0].tie[1] * exponent)
+    value, low, high = interval(unknowns, theta, covariance, POWER[0])
+    assert value == pytest.approx(0.4)
+    np.testing.assert_allclose(np.log([low, high]), np.log(np.quantile(coefficient, [0.025, 0.975])), atol=0.03)

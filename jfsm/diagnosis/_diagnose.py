@@ -180,7 +180,8 @@ def _searched(
     tried, left_out = promising(every)
     trials, behind = search(tried, model, given, refitted, records, until, tell)
     if settled([given, refitted, *trials], refitted):
-        close = [t for t in trials if explained(t, refitted) >= GATE]
+        best = max(trials, key=lambda t: t.evidence)
+        close = [t for t in trials if t is best or explained(t, refitted) >= GATE]
         more = contained([law for t in close for law in t.laws], left_out)
     else:  # of a missing force that is ill seen regression may put the right law last
         more = [c for c in left_out if c.starts]

@@ -12,7 +12,7 @@ from ._trial import Trial, own_values
 
 _SECOND = 15.0
 """Nats by which two effects must beat either of them alone."""
-_UNSEEN = 1.0
+_UNSEEN = 0.1
 """Nats by which a law must beat a special case of it for its further numbers to be seen."""
 _NEAR = 0.01
 """Distance to the farthest own value, as a share of it, from which a value is there."""

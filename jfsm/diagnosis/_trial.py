@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..identification import Hypothesis, Maximum, Nuisances, Posterior, Unknown, without_small_offsets
+from ..identification import Hypothesis, Maximum, Nuisances, Posterior, Unknown, interval, without_small_offsets
 from ..structures import AbstractSensor, AbstractTerm, Structure
 from ._effect import Effect, names, places
 
@@ -131,10 +131,7 @@ class Trial:
 
     def interval(self, path: str, width: float = 1.96) -> tuple[float, float, float]:
         """Value, low and high of an unknown; symmetric in its own coordinate."""
-        k = next(i for i, u in enumerate(self.unknowns) if u.path == path)
-        u, t, sd = self.unknowns[k], self.theta[k], float(np.sqrt(max(self.covariance[k, k], 0.0)))
-        ends = sorted((u.value(t - width * sd), u.value(t + width * sd)))
-        return u.value(t), ends[0], ends[1]
+        return interval(self.unknowns, self.theta, self.covariance, path, width)
 
 
 def ended(t: Trial) -> list[tuple[Unknown, float]]:

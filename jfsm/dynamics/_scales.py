@@ -20,7 +20,8 @@ def scales(model: Structure, load: np.ndarray, *, time: int = 0) -> np.ndarray:
     found = []
     for term in model.terms:
         pairs = zip(term.parameters, term.values, strict=True)
-        numbers += [(p, float(v)) for p, v in pairs if p.force or p.length or p.time]  # an exponent measures nothing
+        # An exponent measures nothing, nor does what has one in its unit.
+        numbers += [(p, float(v)) for p, v in pairs if (p.force or p.length or p.time) and not p.exponent]
         if isinstance(term, MapTerm) and (box := _box(term.force_map)) is not None:
             found.append(np.max(np.abs(box[:, -time])))
     for (p, a), (q, b) in permutations(numbers, 2):

@@ -29,6 +29,7 @@ from ._unknowns import DEGREES_BESIDE as DEGREES_BESIDE
 from ._unknowns import Unknown as Unknown
 from ._unknowns import effect_unknown as effect_unknown
 from ._unknowns import free_unknown as free_unknown
+from ._unknowns import interval as interval
 from ._unknowns import natural_size as natural_size
 from ._unknowns import nuisance_unknowns as nuisance_unknowns
 from ._unknowns import own_unknown as own_unknown

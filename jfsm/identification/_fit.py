@@ -16,7 +16,7 @@ from ._maximise import Maximum, approach, finish
 from ._nuisances import Nuisances, prepare_all
 from ._posterior import Hypothesis, Posterior, lanes_of
 from ._starts import natural_starts, starts
-from ._unknowns import Unknown, bounded, free_unknown, nuisance_unknowns, with_offsets
+from ._unknowns import Unknown, bounded, free_unknown, interval, nuisance_unknowns, untied, with_offsets
 
 _TIED = 0.98
 """Correlation from which two values cannot be told apart in practice,"""
@@ -115,13 +115,11 @@ def fit(
     theta = best.theta[lane]
     covariance = sandwich(best.information[lane], posterior.scatter(best.theta)[lane])
     error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    intervals = {}
-    for u, t, s in zip(unknowns[: len(free)], theta, error, strict=False):
-        low, high = sorted((u.value(max(t - 1.96 * s, u.low)), u.value(min(t + 1.96 * s, u.high))))
-        intervals[u.path] = (float(low), float(high))
+    found = {path: interval(unknowns, theta, covariance, path) for path in free}
+    values = {path: float(value) for path, (value, _, _) in found.items()}
+    intervals = {path: (float(low), float(high)) for path, (_, low, high) in found.items()}
     correlation = covariance / np.maximum(np.outer(error, error), 1e-300)
     pairs = {(free[i], free[j]): float(correlation[i, j]) for i in range(len(free)) for j in range(i)}
-    values = {u.path: float(u.value(t)) for u, t in zip(unknowns[: len(free)], theta, strict=False)}
     kept = without_small_offsets(posterior.structure(theta, lane), unknowns, theta, covariance)
     noise = {
         f"{kind} {j}": float(f * np.exp(t / 2))
@@ -242,6 +240,7 @@ def _bounded(unknowns: list[Unknown], bounds: Mapping[str, tuple[float, float]],
             )
         if not low < high:
             raise ValueError(f"`bounds` of {name!r} must be (low, high) with low < high; got ({low}, {high}).")
+        unknowns = [untied(u, model) if u.path in paths else u for u in unknowns]
         for unknown in unknowns:
             if unknown.path in paths and unknown.log and not max(low / unknown.unit, high / unknown.unit) > 0:
                 sign = "positive" if unknown.unit > 0 else "negative"
@@ -279,6 +278,8 @@ def _words(
 def _combination(first: tuple[Unknown, float, float], second: tuple[Unknown, float, float], r: float) -> str:
     """What two numbers that are tied by a correlation `r` determine together."""
     (u, t, s), (other, t2, s2) = first, second
+    if u.tie or other.tie:
+        return "a combination of both"
     if u.log and other.log and 0.8 < s / s2 < 1.25:
         return "their ratio" if r > 0 else "their product"
     # The combination u + w·other that varies least.

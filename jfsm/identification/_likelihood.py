@@ -30,12 +30,16 @@ _BLOCKS = 64
 
 
 class Lanes(eqx.Module):
-    """Parameter maps of several starts: base + rows·value(theta), the plant's numbers, then x0, v0, log scales."""
+    """Parameter maps of several starts: base + rows·value(theta), the plant's numbers, then x0, v0, log scales.
+
+    A value is its unit times theta or exp(theta), and times exp(tie·values) where it is tied to its exponent.
+    """
 
     base: Float[Array, "lanes size"]
     rows: Float[Array, "lanes unknowns size"]
     unit: Float[Array, "lanes unknowns"]
     log: Float[Array, "lanes unknowns"]
+    tie: Float[Array, "lanes unknowns unknowns"]
 
 
 def _run(
@@ -50,8 +54,9 @@ def _run(
     one_kernel: bool,
 ) -> Innovations:
     """Innovations of one start: of a filter that a force drives, or of the force readings along an imposed motion."""
-    base, rows, unit, log = lane
+    base, rows, unit, log, tie = lane
     value = unit * jnp.where(log > 0, jnp.exp(jnp.where(log > 0, theta, 0.0)), theta)
+    value = value * jnp.exp(tie @ value)
     numbers = base + jnp.sum(rows * value[:, None], 0)
     dof, channels = plant.dof, readings.values.shape[1]
     tail = numbers[numbers.size - 2 * dof - channels :]
@@ -66,9 +71,9 @@ def _each(one, plant: Plant, lanes: Lanes, theta):
     """What `one` makes of every lane."""
     # Values and places differ between lanes; which law stands in a slot does not, so that it stays a branch.
     axes = jax.tree.map(lambda leaf: 0 if jnp.issubdtype(leaf.dtype, jnp.floating) else None, plant)
-    mapped = (lanes.base, lanes.rows, lanes.unit, lanes.log, theta)
+    mapped = (lanes.base, lanes.rows, lanes.unit, lanes.log, lanes.tie, theta)
     if theta.shape[0] > 1:
-        return jax.vmap(one, in_axes=(axes, 0, 0, 0, 0, 0))(plant, *mapped)
+        return jax.vmap(one, in_axes=(axes, 0, 0, 0, 0, 0, 0))(plant, *mapped)
     # One lane alone is not mapped, so that what rarely happens (a reversal) is a branch as well.
     alone = jax.tree.map(lambda leaf: leaf[0] if jnp.issubdtype(leaf.dtype, jnp.floating) else leaf, plant)
     return jax.tree.map(lambda found: found[None], one(alone, *(leaf[0] for leaf in mapped)))
@@ -85,9 +90,11 @@ def derivatives(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, 
 
     few = one_kernel and theta.shape[1] <= _FEW
 
-    def one(plant, base, rows, unit, log, theta):
+    def one(plant, *lane_and_theta):
+        *lane, theta = lane_and_theta
+
         def outcome(theta):
-            found = _run(plant, (base, rows, unit, log), theta, show, fine, readings, noise, doubt, few)
+            found = _run(plant, lane, theta, show, fine, readings, noise, doubt, few)
             return found.error, jnp.log(found.variance), found.log_share
 
         push = partial(jax.jvp, outcome, (theta,))
@@ -116,7 +123,8 @@ def predictions(
 
     few = one_kernel and theta.shape[1] <= _FEW
 
-    def one(plant, base, rows, unit, log, theta):
-        return _run(plant, (base, rows, unit, log), theta, show, fine, readings, noise, doubt, few)
+    def one(plant, *lane_and_theta):
+        *lane, theta = lane_and_theta
+        return _run(plant, lane, theta, show, fine, readings, noise, doubt, few)
 
     return _each(one, plant, lanes, theta)

@@ -15,7 +15,7 @@ from ..structures import AbstractFriction, ChannelDelay, ForceDelay, Structure
 from ._layout import plant_rows, plant_vector
 from ._likelihood import Lanes, derivatives, predictions
 from ._nuisances import Nuisances
-from ._unknowns import Unknown
+from ._unknowns import Unknown, values_of
 
 LANES = 2
 """Starts that run side by side where nothing sticks; fewer are repeated, so that one program serves all."""
@@ -177,7 +177,8 @@ class Posterior:
         """The structure with the values of one lane."""
         unknowns = self.hypothesis.unknowns[lane]
         known = self.hypothesis.structures[lane].values()
-        first = {u.path: u.value(t) for u, t in reversed(list(zip(unknowns, theta, strict=True))) if u.path in known}
+        pairs = reversed(list(zip(unknowns, values_of(unknowns, theta), strict=True)))
+        first = {u.path: value for u, value in pairs if u.path in known}
         return self.hypothesis.structures[lane].with_values(first)
 
     def _part(self, index: int, nuisances: Nuisances) -> tuple[Plant, Lanes, np.ndarray]:
@@ -195,14 +196,14 @@ class Posterior:
             mine_of = [self.hypothesis.unknowns[lane][k] for k in mine]
             structure = self.hypothesis.structures[lane]
             packed[lane] = _lane(structure, mine_of, nuisances, plant_vector(plants[lane]), width, slots)
-        base, rows, unit, log = (jnp.asarray(np.stack([packed[lane][i] for lane in self._pick])) for i in range(4))
+        maps = Lanes(*(jnp.asarray(np.stack(parts)) for parts in zip(*(packed[i] for i in self._pick), strict=True)))
         stacked = jax.tree.map(
             lambda *leaves: jnp.asarray(
                 np.stack(leaves) if jnp.issubdtype(leaves[0].dtype, jnp.floating) else leaves[0]
             ),
             *plants,
         )
-        return stacked, Lanes(base, rows, unit, log), mine
+        return stacked, maps, mine
 
 
 def _lane(structure, unknowns, nuisances: Nuisances, vector, width, slots):
@@ -214,7 +215,7 @@ def _lane(structure, unknowns, nuisances: Nuisances, vector, width, slots):
     )
     size = vector.size + 2 * dof + channels
     base, rows = np.zeros(size), np.zeros((width, size))
-    unit, log = np.zeros(width), np.zeros(width)
+    unit, log, tie = np.zeros(width), np.zeros(width), np.zeros((width, width))
     base[: vector.size] = vector
     base[vector.size :] = np.concatenate([nuisances.x0, nuisances.v0, np.zeros(channels)])
     inside = [u.path for u in unknowns if u.path not in tail]
@@ -222,13 +223,15 @@ def _lane(structure, unknowns, nuisances: Nuisances, vector, width, slots):
     known = structure.values()
     for k, u in enumerate(unknowns):
         unit[k], log[k] = u.unit, float(u.log)
+        if u.tie:
+            tie[k, next(i for i, other in enumerate(unknowns) if other.path == u.tie[0])] = u.tie[1]
         if u.path in tail:
             rows[k, vector.size + tail[u.path]] = 1.0
             base[vector.size + tail[u.path]] = 0.0
         else:
             rows[k, : vector.size] = found[u.path]
             base[: vector.size] -= found[u.path] * known[u.path]
-    return base, rows, unit, log
+    return base, rows, unit, log, tie
 
 
 def _doubt(plant: Plant, nuisances: Nuisances):

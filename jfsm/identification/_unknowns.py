@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..dynamics._imposed import Imposed
-from ..structures import AccelerationBias, Offset, Preload, Structure
+from ..structures import AccelerationBias, Offset, Parameter, Preload, Structure
 from ._nuisances import Nuisances
 
 TRUST = {"stiffness": 0.02, "damping": 0.25, "mass": 0.01}
@@ -35,6 +35,8 @@ _SCALE_SPREAD, _SCALE_SPREAD_GUESSED = 0.5, 3.0
 class Unknown:
     """One number to be found: ``value = unit * exp(theta)`` if `log`, else ``unit * theta``.
 
+    That is multiplied by ``exp(rate * exponent)`` where `tie` is the path of another number, its exponent, and a rate:
+    the coefficient of a power law changes with the exponent as the power of a typical motion does, and theta does not.
     `center` and `width` describe theta beforehand: a normal law, or Student's law with so many `degrees` of freedom.
     `record` is the record that it belongs to, None where all share it.
     """
@@ -49,23 +51,75 @@ class Unknown:
     record: int | None = None
     low: float = -math.inf
     high: float = math.inf
+    tie: tuple[str, float] | None = None
 
-    def value(self, theta: float) -> float:
-        """The number itself."""
-        return self.unit * (math.exp(theta) if self.log else theta)
+    def value(self, theta: float, exponent: float = 0.0) -> float:
+        """The number itself; `exponent` is the value of the one that it is tied to."""
+        scale = math.exp(self.tie[1] * exponent) if self.tie else 1.0
+        return self.unit * scale * (math.exp(theta) if self.log else theta)
 
     def slope(self, theta: float) -> float:
         """Derivative of the number by theta."""
         return self.unit * (math.exp(theta) if self.log else 1.0)
 
 
+def values_of(unknowns: Sequence[Unknown], theta: Sequence[float] | np.ndarray) -> list[float]:
+    """The numbers themselves."""
+    exponents = {u.path: u.value(t) for u, t in zip(unknowns, theta, strict=True)}
+    return [u.value(t, exponents[u.tie[0]] if u.tie else 0.0) for u, t in zip(unknowns, theta, strict=True)]
+
+
+def interval(
+    unknowns: Sequence[Unknown], theta: np.ndarray, covariance: np.ndarray, path: str, width: float = 1.96
+) -> tuple[float, float, float]:
+    """Value of an unknown, and what it is so many standard errors below and above, within its bounds.
+
+    They are symmetric in its own coordinate.
+    """
+    paths = [u.path for u in unknowns]
+    k = paths.index(path)
+    u, t, slope, exponent = unknowns[k], theta[k], np.zeros(theta.size), 0.0
+    slope[k] = 1.0
+    if u.tie:
+        m = paths.index(u.tie[0])
+        exponent = unknowns[m].value(theta[m])
+        slope[m] = (1.0 if u.log else t) * u.tie[1] * unknowns[m].slope(theta[m])
+    sd = math.sqrt(max(slope @ covariance @ slope, 0.0))
+    low, high = sorted((u.value(max(t - width * sd, u.low), exponent), u.value(min(t + width * sd, u.high), exponent)))
+    return u.value(t, exponent), low, high
+
+
+def untied(unknown: Unknown, structure: Structure) -> Unknown:
+    """The same number by itself."""
+    if unknown.tie is None:
+        return unknown
+    path, rate = unknown.tie
+    return replace(unknown, unit=unknown.unit * math.exp(rate * structure.values()[path]), tie=None)
+
+
+def _tied(unknown: Unknown, parameter: Parameter, structure: Structure, nuisances: Nuisances) -> Unknown:
+    """The same number, which begins where it did, tied to its exponent if it has one."""
+    if not parameter.exponent:
+        return unknown
+    exponent, rate = _exponent_of(unknown.path, parameter), _log_size(parameter, nuisances)
+    unit = unknown.unit * math.exp(-rate * structure.values()[exponent])
+    return replace(unknown, unit=unit, tie=(exponent, rate))
+
+
 def natural_size(structure: Structure, path: str, nuisances: Nuisances) -> float:
     """Size of a parameter at which its force equals the elastic force of the motion."""
     parameter = structure.entries()[path][0]
-    if parameter.words:  # its unit holds an exponent that is itself a parameter
-        return abs(structure.values()[path]) or 1.0
-    force, length, omega = nuisances.elastic_force(structure), nuisances.length, nuisances.omega
-    return force**parameter.force * length**parameter.length * omega**-parameter.time
+    power = structure.values()[_exponent_of(path, parameter)] if parameter.exponent else 1.0
+    return nuisances.elastic_force(structure) ** parameter.force * math.exp(power * _log_size(parameter, nuisances))
+
+
+def _log_size(parameter: Parameter, nuisances: Nuisances) -> float:
+    """Logarithm of length and time in a parameter's unit, in sizes of the motion."""
+    return parameter.length * math.log(nuisances.length) - parameter.time * math.log(nuisances.omega)
+
+
+def _exponent_of(path: str, parameter: Parameter) -> str:
+    return f"{path.rpartition('.')[0]}.{parameter.exponent}"
 
 
 def own_unknown(structure: Structure, path: str, trust: Mapping[str, float], degrees: float = DEGREES) -> Unknown:
@@ -86,10 +140,12 @@ def free_unknown(structure: Structure, path: str, nuisances: Nuisances) -> Unkno
     """A value to be found from the data, with a wide law about where it stands."""
     value, parameter = structure.values()[path], structure.entries()[path][0]
     if parameter.positive and value != 0:
-        return bounded(Unknown(path, 0.0, value, True, 0.0, 3.0), parameter.low, parameter.high)
+        unknown = bounded(Unknown(path, 0.0, value, True, 0.0, 3.0), parameter.low, parameter.high)
+        return _tied(unknown, parameter, structure, nuisances)
     scale = max(abs(value), TYPICAL * natural_size(structure, path, nuisances))
     low = max(parameter.low, 0.0) if parameter.positive else parameter.low
-    return bounded(Unknown(path, value / scale, scale, False, value / scale, 10.0), low, parameter.high)
+    unknown = bounded(Unknown(path, value / scale, scale, False, value / scale, 10.0), low, parameter.high)
+    return _tied(unknown, parameter, structure, nuisances)
 
 
 def effect_unknown(structure: Structure, path: str, nuisances: Nuisances) -> Unknown:
@@ -107,7 +163,7 @@ def effect_unknown(structure: Structure, path: str, nuisances: Nuisances) -> Unk
     else:
         unit = natural_size(structure, path, nuisances)
         unknown = Unknown(path, value / unit, unit, False, 0.0, 1.0 + abs(value / unit))
-    return bounded(unknown, parameter.low, parameter.high)
+    return _tied(bounded(unknown, parameter.low, parameter.high), parameter, structure, nuisances)
 
 
 def with_offsets(structure: Structure, records: Sequence[Nuisances]) -> Structure:

@@ -20,10 +20,10 @@ ABOVE_ZERO = 1e-300
 class Parameter(NamedTuple):
     """One number of a law.
 
-    `force`, `length` and `time` are the exponents of its unit: N/m³ is ``force=1, length=-3``; `words` is the unit as a
-    template where an exponent is itself a parameter. A fit keeps the number between `low` and `high`, in logarithms if
-    it is `positive`, and leaves it alone if it is not `free` (a side, an origin of time). A value below `least` is
-    refused.
+    `force`, `length` and `time` are the exponents of its unit: N/m³ is ``force=1, length=-3``. Those of length and time
+    count as often as the law's number named `exponent` says: 1/mⁿ is ``length=-1, exponent="n"``. A fit keeps the
+    number between `low` and `high`, in logarithms if it is `positive`, and leaves it alone if it is not `free` (a side,
+    an origin of time). A value below `least` is refused.
     """
 
     name: str
@@ -36,7 +36,7 @@ class Parameter(NamedTuple):
     high: float = math.inf
     least: float = -math.inf
     free: bool = True
-    words: str = ""
+    exponent: str = ""
 
     def check(self, value: Any, owner: str) -> None:
         """Refuse a value below `least`; one that is being traced cannot be looked at."""
@@ -47,8 +47,10 @@ class Parameter(NamedTuple):
 
     def unit(self, force: str = "N", length: str = "m", time: str = "s") -> str:
         """The unit in words, ``"N/m^3"``, from the record's unit of force and of length."""
-        if self.words:
-            return self.words.format(force=force, length=length, time=time)
+        if self.exponent:
+            over = self._replace(force=0, exponent="").unit(force, length, time)
+            over = f"{over}^{self.exponent}" if over.startswith("1/") else f"({over})^{self.exponent}"
+            return f"{force} {over}" if self.force else over
         if (self.force, self.length, self.time, force, length, time) == (1, -1, 2, "N", "m", "s"):
             return "kg"
         powers = [(force, self.force), (length, self.length), (time, self.time)]

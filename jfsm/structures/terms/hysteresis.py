@@ -6,7 +6,7 @@ import numpy as np
 
 from ..._types import as_scalar
 from .._term import ABOVE_ZERO, AbstractTerm, Parameter, Scalar, as_link
-from .piecewise_stiffness import beyond
+from .piecewise_stiffness import EndStop, beyond
 
 _STIFFNESS = Parameter("k", force=1, length=-1, meaning="stiffness while it sticks")
 _SLIDERS = 16
@@ -38,8 +38,8 @@ class BoucWen(AbstractTerm):
     kind = "bouc_wen"
     parameters = (
         Parameter("k", force=1, length=-1, meaning="hysteretic stiffness"),
-        Parameter("beta", positive=False, meaning="what the loop loses", words="1/{length}^n"),
-        Parameter("gamma", positive=False, meaning="how the loop leans", words="1/{length}^n"),
+        Parameter("beta", length=-1, positive=False, meaning="what the loop loses", exponent="n"),
+        Parameter("gamma", length=-1, positive=False, meaning="how the loop leans", exponent="n"),
         Parameter("n", meaning="sharpness of yielding", least=ABOVE_ZERO, low=1.0, high=8.0),
     )
     states = 1
@@ -154,6 +154,7 @@ class FreePlay(AbstractTerm):
     F_minus: Scalar = eqx.field(converter=as_scalar)
     at: tuple[int, int] = eqx.field(converter=as_link, static=True, kw_only=True)
     kind = "free_play"
+    contains = (Jenkins, EndStop)  # without a gap, and where nothing slides
     parameters = (
         Parameter("k", force=1, length=-1, meaning="stiffness behind the gap", least=ABOVE_ZERO),
         Parameter("gap", length=1, meaning="half width of the gap", least=0.0),

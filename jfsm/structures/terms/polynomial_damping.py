@@ -44,7 +44,7 @@ class PowerDamping(AbstractTerm):
     kind = "power_damping"
     contains = (QuadraticDamping, CubicDamping)
     parameters = (
-        Parameter("c", force=1, meaning="power-law damping", words="{force} ({time}/{length})^n"),
+        Parameter("c", force=1, length=-1, time=1, meaning="power-law damping", exponent="n"),
         Parameter("n", meaning="exponent of the speed", least=ABOVE_ZERO, low=0.05, high=6.0),
     )
 
