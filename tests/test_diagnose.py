@@ -234,6 +234,20 @@ def test_faults_of_the_measuring_chain_and_a_constant_force_are_named(cause, at,
     assert d.gain is not None and d.gain.after < d.gain.before
 
 
+@pytest.mark.parametrize("late", ["force", "displacement"])
+def test_of_two_channels_that_are_apart_in_time_the_late_one_is_named(believed, late):
+    punctual, samples = made(linear, channels=("displacement",)), 3
+    channels = {kind: punctual.channels[kind, 1] for kind in ("force", "displacement")}
+    shifted = {kind: y[:-samples] if kind == late else y[samples:] for kind, y in channels.items()}
+    r = jfsm.Record(punctual.time[samples:], **shifted)
+    d = jfsm.diagnose(r, believed, causes=("force_delay", "channel_delay"), key=jax.random.key(0))
+    (finding,) = d.findings
+    assert finding.cause == {"force": "force_delay", "displacement": "channel_delay"}[late]
+    assert finding.parameters["tau"].value == pytest.approx(samples * STEP, rel=0.05)
+    (rival,) = finding.rivals
+    assert 0.05 < rival.probability < finding.probability, "the other may be early, though hardly any channel is"
+
+
 def two_laws(x, v):
     return duffing(x, v) + 0.5 * v * np.abs(v)
 

@@ -143,9 +143,10 @@ def promising(tried: Sequence[Candidate]) -> tuple[list[Candidate], list[Candida
 
 
 def contained(laws: Sequence[AbstractTerm], among: Sequence[Candidate]) -> list[Candidate]:
-    """Candidates whose law is what one of `laws` is for certain of its numbers, at the same place."""
+    """Candidates that can begin and whose law is what one of `laws` is for certain of its numbers, at its place."""
     found = {(law.at, kind) for law in laws for kind in law.contains}
-    return [c for c in among if len(c.effects) == 1 and (c.effects[0].at, c.effects[0].cause.effect) in found]
+    alone = [c for c in among if c.starts and len(c.effects) == 1]
+    return [c for c in alone if (c.effects[0].at, c.effects[0].cause.effect) in found]
 
 
 class Laws:

@@ -279,6 +279,7 @@ def prior(unknowns: Sequence[Unknown], theta: np.ndarray) -> tuple[float, np.nda
     value, gradient, curvature = 0.0, np.zeros(theta.size), np.zeros(theta.size)
     for k, (u, t) in enumerate(zip(unknowns, theta, strict=True)):
         r = (t - u.center) / u.width
+        value += u.cost
         if math.isfinite(u.degrees):
             spread = u.degrees + r * r
             value += (u.degrees + 1) / 2 * math.log(spread / u.degrees) + math.log(u.width) + _student(u.degrees)

@@ -21,6 +21,8 @@ DEGREES_BESIDE = 4.0
 TYPICAL, TYPICAL_SPREAD = 0.15, 1.5
 """An effect's size as a share of the elastic force, and the spread of its logarithm."""
 _SHAPE_SPREAD = 1.0
+_UNUSUAL = math.log(10.0)
+"""Nats that an unusual sign costs: filters and converters make a channel late, only the lateness of others early."""
 _OFFSET, _SLIGHT = 0.1, 0.01
 """Offset of a channel, as a share of its spread: a nuisance, no more. That of a force or an acceleration is believed to
 be slight, for a larger one is a cause: a constant force, or an accelerometer's bias."""
@@ -38,7 +40,8 @@ class Unknown:
     That is multiplied by ``exp(rate * exponent)`` where `tie` is the path of another number, its exponent, and a rate:
     the coefficient of a power law changes with the exponent as the power of a typical motion does, and theta does not.
     `center` and `width` describe theta beforehand: a normal law, or Student's law with so many `degrees` of freedom.
-    `record` is the record that it belongs to, None where all share it.
+    `cost` is what is held against all its values, in nats. `record` is the record that it belongs to, None where all
+    share it.
     """
 
     path: str
@@ -52,6 +55,7 @@ class Unknown:
     low: float = -math.inf
     high: float = math.inf
     tie: tuple[str, float] | None = None
+    cost: float = 0.0
 
     def value(self, theta: float, exponent: float = 0.0) -> float:
         """The number itself; `exponent` is the value of the one that it is tied to."""
@@ -156,8 +160,8 @@ def effect_unknown(structure: Structure, path: str, nuisances: Nuisances) -> Unk
     value, parameter = structure.values()[path], structure.entries()[path][0]
     if parameter.force or path.split("@")[0] in {sensor.kind for sensor in structure.sensors}:
         typical = TYPICAL * natural_size(structure, path, nuisances)
-        unit = math.copysign(typical, value)
-        unknown = Unknown(path, math.log(value / unit), unit, True, 0.0, TYPICAL_SPREAD)
+        unit, cost = math.copysign(typical, value), _UNUSUAL if parameter.usual * value < 0 else 0.0
+        unknown = Unknown(path, math.log(value / unit), unit, True, 0.0, TYPICAL_SPREAD, cost=cost)
     elif parameter.positive:
         unknown = Unknown(path, 0.0, value, True, 0.0, _SHAPE_SPREAD)
     else:

@@ -79,7 +79,7 @@ class ForceDelay(AbstractSensor):
     at: tuple[str, int] = eqx.field(converter=as_channel, static=True, kw_only=True)
     kind = "force_delay"
     channels = ("force",)
-    parameters = (Parameter("tau", time=1, positive=False, meaning="delay of the force sensor"),)
+    parameters = (Parameter("tau", time=1, positive=False, meaning="delay of the force sensor", usual=1),)
 
 
 class ChannelDelay(AbstractSensor):
@@ -89,7 +89,7 @@ class ChannelDelay(AbstractSensor):
     at: tuple[str, int] = eqx.field(converter=as_channel, static=True, kw_only=True)
     kind = "channel_delay"
     channels = RESPONSES
-    parameters = (Parameter("tau", time=1, positive=False, meaning="delay of the channel"),)
+    parameters = (Parameter("tau", time=1, positive=False, meaning="delay of the channel", usual=1),)
 
 
 class AccelerationBias(AbstractSensor):

@@ -23,7 +23,7 @@ class Parameter(NamedTuple):
     `force`, `length` and `time` are the exponents of its unit: N/m³ is ``force=1, length=-3``. Those of length and time
     count as often as the law's number named `exponent` says: 1/mⁿ is ``length=-1, exponent="n"``. A fit keeps the
     number between `low` and `high`, in logarithms if it is `positive`, and leaves it alone if it is not `free` (a side,
-    an origin of time). A value below `least` is refused.
+    an origin of time). A value below `least` is refused. One that may have either sign has the `usual` one as a rule.
     """
 
     name: str
@@ -37,6 +37,7 @@ class Parameter(NamedTuple):
     least: float = -math.inf
     free: bool = True
     exponent: str = ""
+    usual: int = 0
 
     def check(self, value: Any, owner: str) -> None:
         """Refuse a value below `least`; one that is being traced cannot be looked at."""
