@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.diagnosis._candidates import candidates, chosen_causes, contained, hypothesis, own_paths
+from jfsm.diagnosis._candidates import Candidate, candidates, chosen_causes, contained, hypothesis, own_paths
+from jfsm.diagnosis._effect import Effect
 from jfsm.identification import Nuisances, prepare
 
 CHAIN = jfsm.Structure.chain([1.0, 1.0], [20.0, 20.0], [0.2, 0.2])
@@ -65,3 +66,8 @@ def test_the_special_cases_of_a_law_are_followed_where_it_is(shaken):
         ("quadratic_damping", (1, 2)),
         ("cubic_damping", (1, 2)),
     }
+
+
+def test_a_special_case_that_explains_nothing_is_not_followed():
+    idle = Candidate((Effect(chosen_causes(["jenkins"])["jenkins"], (0, 1)),), ())
+    assert contained([jfsm.FreePlay(1.0, 0.1, 1.0, 1.0, at=(0, 1))], [idle]) == []

@@ -239,7 +239,7 @@ def test_of_two_channels_that_are_apart_in_time_the_late_one_is_named(believed, 
     punctual, samples = made(linear, channels=("displacement",)), 3
     channels = {kind: punctual.channels[kind, 1] for kind in ("force", "displacement")}
     shifted = {kind: y[:-samples] if kind == late else y[samples:] for kind, y in channels.items()}
-    r = jfsm.Record(punctual.time[samples:], **shifted)
+    r = jfsm.Record(punctual.time[samples:], shifted["force"], displacement=shifted["displacement"])
     d = jfsm.diagnose(r, believed, causes=("force_delay", "channel_delay"), key=jax.random.key(0))
     (finding,) = d.findings
     assert finding.cause == {"force": "force_delay", "displacement": "channel_delay"}[late]
