@@ -82,8 +82,8 @@ def answer(monkeypatch, verdict: str = "consistent") -> dict[str, Any]:
     """Lets `diagnose` return this verdict at once; what it was called with appears in the dictionary."""
     seen: dict[str, Any] = {}
 
-    def quick(record, model, holdout, causes, max_causes, key, progress):
-        seen.update(record=record, model=model, holdout=holdout, causes=causes, max_causes=max_causes, key=key)
+    def quick(records, model, holdout, causes, max_causes, key, progress):
+        seen.update(records=records, model=model, holdout=holdout, causes=causes, max_causes=max_causes, key=key)
         progress("looking", 1, 4)
         return FakeDiagnosis(verdict=verdict)
 
@@ -136,9 +136,9 @@ def test_several_degrees_of_freedom_are_numbered_or_in_their_order(names, dofs, 
     seen = answer(monkeypatch)
     options = [part for name in names for part in ("--displacement", name)]
     assert run("diagnose", tmp_path / "run.npz", *options, "--model", folder / "model.toml").exit_code == 0
-    assert list(seen["record"].channels) == [("displacement", dof) for dof in sorted(dofs)]
+    assert list(seen["records"][0].channels) == [("displacement", dof) for dof in sorted(dofs)]
     for dof, name in dofs.items():
-        np.testing.assert_array_equal(seen["record"].channels["displacement", dof], waves[name])
+        np.testing.assert_array_equal(seen["records"][0].channels["displacement", dof], waves[name])
 
 
 def test_every_kind_of_channel_has_its_option(folder, tmp_path, monkeypatch):
@@ -151,7 +151,7 @@ def test_every_kind_of_channel_has_its_option(folder, tmp_path, monkeypatch):
     options = [part for kind in kinds for part in (f"--{kind}", f"my_{kind}")]
     more = ["--base-acceleration", "base", "--time", "clock", "--at-rest"]
     assert run("diagnose", tmp_path / "run.csv", *options, *more, "--model", folder / "model.toml").exit_code == 0
-    record = seen["record"]
+    record = seen["records"][0]
     assert record.at_rest
     np.testing.assert_array_equal(record.time, time)
     np.testing.assert_array_equal(record.base_acceleration, np.sin(time))
@@ -168,20 +168,37 @@ def test_only_a_consistent_model_ends_with_zero(verdict, code, channels, folder,
     assert (result.exit_code, result.stdout, result.stderr) == (code, f"verdict: {verdict}\n", "")
 
 
-@pytest.mark.parametrize(("text", "held"), [("none", None), ("0.2", 0.2)])
-def test_what_is_held_out_is_a_share_or_nothing(text, held, channels, folder, monkeypatch):
+@pytest.mark.parametrize(("words", "held"), [((), 0.3), (("--holdout", "none"), None), (("--holdout", "0.2"), 0.2)])
+def test_what_is_held_out_is_a_share_or_nothing(words, held, channels, folder, monkeypatch):
     seen = answer(monkeypatch)
-    assert run("diagnose", *channels, "--model", folder / "model.toml", "--holdout", text).exit_code == 0
+    assert run("diagnose", *channels, "--model", folder / "model.toml", *words).exit_code == 0
     assert seen["holdout"] == held
 
 
-def test_a_second_file_is_held_out_with_the_channels_of_the_first(channels, folder, tmp_path, monkeypatch):
-    other = tmp_path / "other.csv"
-    other.write_text("\n".join((folder / "run.csv").read_text().splitlines()[:101]))
+def test_several_files_are_fitted_and_held_out_with_the_same_channels(channels, folder, tmp_path, monkeypatch):
+    lines = (folder / "run.csv").read_text().splitlines()
+    files = {samples: tmp_path / f"{samples}.csv" for samples in (100, 120, 140)}
+    for samples, path in files.items():
+        path.write_text("\n".join(lines[: samples + 1]))
     seen = answer(monkeypatch)
-    assert run("diagnose", *channels, "--model", folder / "model.toml", "--holdout", other).exit_code == 0
-    assert len(seen["holdout"]) == 100
-    np.testing.assert_array_equal(seen["holdout"].displacement, seen["record"].displacement[:100])
+    held = ("--holdout", files[120], "--holdout", files[140])
+    assert run("diagnose", *channels, files[100], "--model", folder / "model.toml", *held).exit_code == 0
+    whole, short = seen["records"]
+    assert [len(record) for record in (short, *seen["holdout"])] == [100, 120, 140]
+    for record in (short, *seen["holdout"]):
+        np.testing.assert_array_equal(record.displacement, whole.displacement[: len(record)])
+
+
+def test_a_model_is_fitted_to_several_records_at_once(channels, folder, tmp_path):
+    lines = (folder / "run.csv").read_text().splitlines()
+    (tmp_path / "short.csv").write_text("\n".join(lines[:301]))
+    fits = {}
+    for name, more in {"one": (), "both": (tmp_path / "short.csv",)}.items():
+        assert run("fit", *channels, *more, "--model", folder / "stiff.toml", "--out", tmp_path / name).exit_code == 0
+        fits[name] = Structure.load(tmp_path / name).values()["stiffness@0-1.k"]
+    true = Structure.load(folder / "model.toml").values()["stiffness@0-1.k"]
+    assert fits["both"] != fits["one"]
+    assert fits["both"] == pytest.approx(true, rel=0.01)
 
 
 def test_a_seed_is_passed_on_and_none_is_made_up(channels, folder, monkeypatch):
@@ -339,7 +356,7 @@ def test_a_model_is_asked_for():
 
 def test_a_holdout_that_is_neither_share_nor_file_is_refused(channels, folder):
     text = refusal("diagnose", *channels, "--model", folder / "model.toml", "--holdout", "some")
-    assert "--holdout must be a share such as 0.3, a file, or none; it was 'some'." in text
+    assert "--holdout must be a share such as 0.3, none, or files; it was 'some'." in text
     text = refusal("diagnose", *channels, "--model", folder / "model.toml", "--holdout", "1.5")
     assert "`holdout` as a share must lie between 0 and 1" in text
 

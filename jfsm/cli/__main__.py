@@ -1,0 +1,5 @@
+"""`python -m jfsm.cli`."""
+
+from . import main
+
+main()

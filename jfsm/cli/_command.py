@@ -1,0 +1,78 @@
+"""What every command does: doubles, refusals in words, and an exit code for every way to end."""
+
+import functools
+import os
+import sys
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+import typer
+from platformdirs import user_cache_path
+
+from ._output import say
+
+FOUND, BAD_INPUT, NOT_FINISHED = 1, 2, 3
+
+_WORTH_KEEPING = "0.2"
+"""Seconds of compilation from which a program is kept for the next call."""
+
+app = typer.Typer(
+    help="What a simulation gets wrong against a measured record, the name of the cause, and the gain of mending it.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+def command(function: Callable[..., None]) -> Callable[..., None]:
+    """A command that owns its process: doubles from here on, and an exit code for every way to end."""
+
+    @functools.wraps(function)
+    def run(**options: Any) -> None:
+        try:
+            _settle_jax()
+            function(**options)
+        except BrokenPipeError:  # whoever read the output has seen enough; typer ends such a process in silence
+            raise
+        except (ValueError, OSError) as error:
+            if not _is_refusal(error):
+                raise
+            say(_words(error))
+            raise typer.Exit(BAD_INPUT) from None
+        except KeyboardInterrupt:
+            say("Stopped before the end; no file was left half written.")
+            raise typer.Exit(NOT_FINISHED) from None
+
+    return app.command()(run)
+
+
+def _settle_jax() -> None:
+    """Double precision from here on, and compiled programs kept for the next call; JAX itself is loaded where needed.
+
+    `JAX_COMPILATION_CACHE_DIR` says where they are kept, `JAX_ENABLE_COMPILATION_CACHE=0` that they are not.
+    """
+    if "jax" in sys.modules:
+        sys.modules["jax"].config.update("jax_enable_x64", True)
+        return
+    # Read when it is loaded.
+    os.environ["JAX_ENABLE_X64"] = "1"
+    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(user_cache_path("jfsm")))
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", _WORTH_KEEPING)
+
+
+def _is_refusal(error: Exception) -> bool:
+    """Whether an error is about the input: of the operating system, or raised by jfsm in words.
+
+    A ValueError from a library underneath is a mistake of jfsm, whose traceback is wanted.
+    """
+    *_, (frame, _) = traceback.walk_tb(error.__traceback__)
+    package = frame.f_globals.get("__package__") or ""
+    return isinstance(error, OSError) or package.split(".")[0] == "jfsm"
+
+
+def _words(error: Exception) -> str:
+    """What went wrong; of an error of the operating system without its number."""
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.strerror}: {error.filename}"
+    return str(error)

@@ -1,0 +1,292 @@
+"""The commands."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ._command import FOUND, NOT_FINISHED, command
+from ._input import (
+    CHANNELS,
+    ModelFile,
+    Rate,
+    RecordFile,
+    RecordFiles,
+    Seed,
+    Units,
+    check_outputs,
+    link,
+    load,
+    option,
+    random_key,
+    takes_record,
+    units,
+)
+from ._output import progress, say, show_table
+
+if TYPE_CHECKING:
+    import jax
+
+    from ..diagnosis import Diagnosis
+
+
+@command
+@takes_record
+def inspect(source: RecordFile, report: Annotated[Path | None, option("Write the page here, as HTML.")] = None) -> None:
+    """Show what a record holds, and what is odd about it."""
+    check_outputs({"--report": report}, [source.record])
+    inspection = source.read().inspect()
+    if report is not None:
+        inspection.report(report)
+    inspection.print()  # last, so that a reader who closes the pipe loses no file
+
+
+@command
+@takes_record
+def simulate(
+    source: RecordFile,
+    model: ModelFile,
+    out: Annotated[Path, option("Write the motion here, as a csv, txt, npz or mat file.")],
+) -> None:
+    """Run a model freely under the force of a record, and write its motion as a record.
+
+    With --drive motion, the force that the record's motion needs.
+    """
+    from ..dynamics import simulate
+    from ..records import Record
+
+    check_outputs({"--out": out}, [source.record, model])
+    record = source.read()
+    response = simulate(load(model), record)
+    if not response.result.ok:
+        say(f"At t = {response.escape_time:.6g} s {response.result.value}. Nothing was written.")
+        raise typer.Exit(NOT_FINISHED)
+    forces = {dof: samples for (kind, dof), samples in record.channels.items() if kind == "force"}
+    Record(
+        response.time,
+        force=(forces or None) if response.force is None else response.force,
+        displacement=response.displacement,
+        velocity=response.velocity,
+        acceleration=response.acceleration,
+        base_acceleration=record.base_acceleration,
+        units=record.units,
+        at_rest=record.at_rest,
+        drive=record.drive,
+        name=f"{record.name}, simulated",
+    ).write(out)
+    what = "motion" if response.force is None else "force of the motion"
+    typer.echo(f"The {what} of {len(response.time)} samples is in {out}.")
+
+
+@command
+@takes_record
+def fit(
+    source: RecordFiles,
+    model: ModelFile,
+    out: Annotated[Path, option("Write the fitted model here, as TOML.")],
+    fixed: Annotated[list[str] | None, option("What stays as it is: mass, stiffness@0-1.k; repeatable.")] = None,
+) -> None:
+    """Fit a model's own values to a record, or to several at once."""
+    from ..identification import fit
+
+    check_outputs({"--out": out}, [*source.records, model])
+    records, given = source.read(), load(model)
+    with progress() as tell:
+        tell("fitting", 0, 1)
+        found = fit(given, records, fixed=tuple(fixed or ()))
+    rows, in_units = [], records[0].units
+    for path, value in found.values.items():
+        unit = given.entries()[path][0].unit(in_units["force"], in_units["displacement"])
+        low, high = found.intervals[path]
+        rows.append((path, f"{given.values()[path]:.6g}", f"{value:.6g}", f"[{low:.6g}, {high:.6g}]", unit))
+    show_table("Fitted values", ("value", "given", "fitted", "95 % interval", "unit"), rows)
+    for words in found.identifiability:
+        typer.echo(words)
+    found.structure.save(out)
+    typer.echo(f"The fitted model is in {out}.")
+    if not found.result.ok:
+        say(f"The fit {found.result.value}.")
+        raise typer.Exit(FOUND)
+
+
+@command
+@takes_record
+def diagnose(
+    source: RecordFiles,
+    model: ModelFile,
+    holdout: Annotated[
+        list[str] | None,
+        option(
+            "Share of the record that is held out (0.3 without it), none, or a file; repeat for more.", "SHARE|FILE"
+        ),
+    ] = None,
+    report: Annotated[Path | None, option("Write the page here, as HTML.")] = None,
+    json: Annotated[Path | None, option("Write every number here, as JSON.")] = None,
+    extended: Annotated[Path | None, option("Write the mended model here, as TOML; a map goes beside it.")] = None,
+    cause: Annotated[
+        list[str] | None, typer.Option(help="Look for this cause (`jfsm causes` lists them); repeat for more.")
+    ] = None,
+    max_causes: Annotated[int, typer.Option(help="Effects that may act at once: 1, or 2.", min=1, max=2)] = 2,
+    what_next: Annotated[
+        bool, typer.Option("--next", help="Also say what test would tell the two likeliest causes apart.")
+    ] = False,
+    key: Seed = None,
+) -> None:
+    """Say what a model gets wrong about a record, why, and what mending it is worth.
+
+    Of several records, one verdict that holds on all.
+    """
+    from ..diagnosis import diagnose
+
+    inputs = [*source.records, model, *(Path(text) for text in holdout or ())]
+    check_outputs({"--report": report, "--json": json, "--extended": extended}, inputs)
+    records, held, believed = source.read(), source.held_out(holdout), load(model)
+    with progress() as tell:
+        d = diagnose(
+            records, believed, holdout=held, causes=cause, max_causes=max_causes, key=random_key(key), progress=tell
+        )
+    if report is not None:
+        d.report(report)
+    if json is not None:
+        d.to_json(json)
+    if extended is not None:
+        d.extended.save(extended)
+    d.print()  # last, so that a reader who closes the pipe loses no file
+    if what_next:
+        _say_what_next(d, random_key(key))
+    if d.verdict != "consistent":
+        raise typer.Exit(FOUND)
+
+
+@command
+@takes_record
+def map(
+    source: RecordFile,
+    model: Annotated[Path | None, option("Map what this model lacks, as TOML; else all of the force.")] = None,
+    mass: Annotated[float | None, option("Mass of a single degree of freedom, without a model.", "KG")] = None,
+    at: Annotated[str | None, option("The link, where the model has several; 0 is ground.", "I-J")] = None,
+    method: Annotated[
+        str, typer.Option(help="What learns the map: rkpm, kriging, or joint: kriging with the motion.")
+    ] = "rkpm",
+    order: Annotated[int | None, option("Order of its polynomials; chosen by the readings without it.")] = None,
+    out: Annotated[Path | None, option("Write the map here, as npz.")] = None,
+    report: Annotated[Path | None, option("Write the page here, as HTML.")] = None,
+) -> None:
+    """Map the force of a record, or what a model lacks of it, over displacement and velocity."""
+    from ..diagnosis import map_force
+
+    inputs = [source.record] if model is None else [source.record, model]
+    check_outputs({"--out": out, "--report": report}, inputs)
+    record, believed, place = source.read(), None if model is None else load(model), link(at)
+    with progress() as tell:
+        tell("the motion and the map", 0, 1)
+        found = map_force(record, believed, mass, place, method, order)
+    if out is not None:
+        found.force_map.save(out)
+    if report is not None:
+        found.report(report)
+    found.print()  # last, so that a reader who closes the pipe loses no file
+
+
+@command
+def report(
+    numbers: Annotated[
+        Path, typer.Argument(metavar="JSON", help="What `jfsm diagnose --json` wrote.", show_default=False)
+    ],
+    report: Annotated[Path, option("Write the page here, as HTML.")],
+) -> None:
+    """Make the page of a diagnosis again from its numbers."""
+    from ..reporting import render_json, write_text_atomically
+
+    check_outputs({"--report": report}, [numbers])
+    write_text_atomically(report, render_json(numbers))
+    typer.echo(f"The page is {report.resolve()}.")
+
+
+@command
+def causes() -> None:
+    """List the catalogue of causes."""
+    from ..structures import causes
+
+    for family in dict.fromkeys(cause.family for cause in causes().values()):
+        rows = [
+            (cause.id, f"{', '.join(p.name for p in cause.effect.parameters)}: {cause.sentence}")
+            for cause in causes().values()
+            if cause.family == family
+        ]
+        show_table(family.capitalize(), ("cause", "parameters and what it is"), rows)
+
+
+@command
+def demo(
+    data: Annotated[Path | None, option("Diagnose this file instead of the made-up record, as Silverbox.")] = None,
+    force: Annotated[str, typer.Option(help="Name of the force in --data.", rich_help_panel=CHANNELS)] = "u",
+    displacement: Annotated[
+        str, typer.Option(help="Name of the displacement in --data.", rich_help_panel=CHANNELS)
+    ] = "y",
+    unit: Units = None,
+    rate: Rate = None,
+    report: Annotated[Path, typer.Option(help="Where the page goes, as HTML.")] = Path("jfsm-demo.html"),
+    key: Annotated[int, typer.Option(help="Seed of the made-up record and of the few random draws.", min=0)] = 0,
+) -> None:
+    """Show a whole diagnosis: of a made-up record that hides an effect, or of a measured one."""
+    from ..demo import hidden_friction, measured
+    from ..diagnosis import diagnose
+
+    check_outputs({"--report": report}, [] if data is None else [data])
+    with progress() as tell:
+        tell("the record and the linear model", 0, 1)
+        if data is None:
+            shown = hidden_friction(key)
+        else:
+            shown = measured(data, force=force, displacement=displacement, units=units(unit), rate=rate)
+        typer.echo(shown.introduction + "\n")
+        d = diagnose(shown.record, shown.model, holdout=shown.holdout, key=random_key(key), progress=tell)
+    d.report(report)
+    d.print()
+    if shown.hidden is not None:
+        typer.echo(shown.hidden)
+    typer.echo(f"The page is {report.resolve()}.")
+
+
+@command
+def paper(
+    section: Annotated[
+        list[str] | None, option("Repeat this section alone: 2, 3, 4, 5 or noise; repeat for more.", "SECTION")
+    ] = None,
+    figures: Annotated[Path | None, option("Draw the figures into this folder, as PNG.", "DIR")] = None,
+    json: Annotated[Path | None, option("Write every number here, as JSON.")] = None,
+) -> None:
+    """Repeat the study of the paper this grew from: its numbers beside ours and the truth."""
+    from ..paper import study
+
+    check_outputs({"--json": json}, [])
+    if figures is not None:
+        figures.mkdir(parents=True, exist_ok=True)  # before any work: what stands in its way is refused
+    with progress() as tell:
+        found = study(section, tell)
+        if figures is not None:
+            found.figures(figures, tell)
+    if json is not None:
+        found.to_json(json)
+    for outcome in found.sections.values():
+        for table in outcome.tables():
+            show_table(table.title, table.headings, table.rows)
+            for note in table.notes:
+                typer.echo(f"  {note}.")
+            typer.echo()
+    typer.echo("! marks what the paper prints otherwise than the truth is; errors are relative.")
+
+
+def _say_what_next(d: "Diagnosis", key: "jax.Array | None") -> None:
+    """Tests that would tell the two likeliest causes apart, as a table."""
+    with progress() as tell:
+        found = d.next_tests(key, tell)
+    if not found:
+        typer.echo("There are no two causes that a test could tell apart.")
+        return
+    rows = [(f"{p.nats:.0f}", f"x {p.reach:.2g}", p.what) for p in found]
+    one, other = found[0].rivals
+    show_table(f"What to measure next, to tell {one} from {other}", ("nats", "response", "test"), rows)
+    if not found[0].tells:
+        typer.echo("None of them would.")

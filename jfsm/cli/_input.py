@@ -1,0 +1,220 @@
+"""What a command is given: records with their channels, models, and where the results go."""
+
+import functools
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from inspect import Parameter, signature
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    import jax
+
+    from ..records import Record
+    from ..structures import Structure
+
+
+def option(text: str, metavar: str | None = None, panel: str | None = None) -> Any:
+    return typer.Option(help=text, metavar=metavar, rich_help_panel=panel, show_default=False)
+
+
+def _argument(metavar: str, text: str) -> Any:
+    return typer.Argument(metavar=metavar, help=text, show_default=False)
+
+
+CHANNELS = "Channels of the record"
+"""The panel of the help in which they stand."""
+
+_FORMATS = "csv, txt, npz, mat, h5, uff; tdms and mf4 with the extras."
+
+Names = Annotated[list[str] | None, option("Name in the file; once per degree of freedom.", "[DOF=]NAME", CHANNELS)]
+Units = Annotated[list[str] | None, option("Unit of a channel, as y=mm; once per channel.", "NAME=UNIT", CHANNELS)]
+Where = Annotated[
+    list[str] | None, option("Rows of a long table to take, as run=3; once per column.", "NAME=VALUE", CHANNELS)
+]
+Rate = Annotated[float | None, option("Samples per second of a file without a clock.", "HZ", CHANNELS)]
+ModelFile = Annotated[Path, option("The model that is believed, as TOML.")]
+Seed = Annotated[int | None, option("Seed of the few random draws; without it, another one every time.")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Channels:
+    """What the channels of a file are called: the options that every command with records shares."""
+
+    force: Names = None
+    displacement: Names = None
+    velocity: Names = None
+    acceleration: Names = None
+    base_acceleration: Annotated[str | None, option("Name in the file.", "NAME", CHANNELS)] = None
+    time: Annotated[str | None, option("Name of the column of instants.", "NAME", CHANNELS)] = None
+    rate: Rate = None
+    unit: Units = None
+    where: Where = None
+    at_rest: Annotated[
+        bool, typer.Option("--at-rest", help="At rest at the first sample.", rich_help_panel=CHANNELS)
+    ] = False
+    drive: Annotated[
+        str | None, option("What is imposed: force, or motion (a component on a rig).", "force|motion", CHANNELS)
+    ] = None
+
+    def read_file(self, path: Path) -> "Record":
+        """The record in a file."""
+        from ..records import read
+
+        try:
+            return read(
+                path,
+                force=_channel_names("force", self.force),
+                displacement=_channel_names("displacement", self.displacement),
+                velocity=_channel_names("velocity", self.velocity),
+                acceleration=_channel_names("acceleration", self.acceleration),
+                base_acceleration=self.base_acceleration,
+                time=self.time,
+                rate=self.rate,
+                units=units(self.unit),
+                where=_where(self.where),
+                at_rest=self.at_rest or None,  # without the option, what the file says
+                drive=self.drive,  # pyright: ignore[reportArgumentType]  # refused there unless it is one of the two
+            )
+        except TypeError as error:  # from what the file holds; a TypeError of any later step is a mistake of ours
+            raise ValueError(f"{path}: {error}") from error
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordFile(_Channels):
+    """A file, and what its channels are called."""
+
+    record: Annotated[Path, _argument("RECORD", f"The record: {_FORMATS}")]
+
+    def read(self) -> "Record":
+        """The record in the file."""
+        return self.read_file(self.record)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordFiles(_Channels):
+    """Files whose channels are called alike: levels, repeats or starts of one test."""
+
+    records: Annotated[list[Path], _argument("RECORD", f"One record, or several of one test: {_FORMATS}")]
+
+    def read(self) -> "list[Record]":
+        """The records in the files."""
+        return [self.read_file(path) for path in self.records]
+
+    def held_out(self, given: Sequence[str] | None) -> "float | list[Record] | None":
+        """A share, nothing, or the records in other files."""
+        match given:
+            case None | []:
+                return 0.3
+            case ["none"]:
+                return None
+            case [text] if not Path(text).is_file():
+                try:
+                    return float(text)
+                except ValueError:
+                    pass
+        for text in given:
+            if not Path(text).is_file():
+                raise ValueError(f"--holdout must be a share such as 0.3, none, or files; it was {text!r}.")
+        return [self.read_file(Path(text)) for text in given]
+
+
+def takes_record(function: Callable[..., None]) -> Callable[..., None]:
+    """The command with the options of `RecordFile` or `RecordFiles` in place of its first parameter, which is one."""
+    first, *own = signature(function).parameters.values()
+    shared = signature(first.annotation).parameters
+    parameters = [p.replace(kind=Parameter.KEYWORD_ONLY) for p in (*shared.values(), *own)]
+
+    @functools.wraps(function)
+    def run(**options: Any) -> None:
+        given = first.annotation(**{name: options.pop(name) for name in shared})
+        function(**{first.name: given}, **options)
+
+    # This is where typer looks for what to parse.
+    run.__signature__ = signature(function).replace(parameters=parameters)  # pyright: ignore[reportAttributeAccessIssue]
+    run.__annotations__ = {p.name: p.annotation for p in parameters}
+    return run
+
+
+def load(path: Path) -> "Structure":
+    """The structure in a TOML file."""
+    from ..structures import Structure
+
+    try:
+        return Structure.load(path)
+    except TypeError as error:  # a text where a number belongs
+        raise ValueError(f"{path}: {error}") from error
+
+
+def random_key(seed: int | None) -> "jax.Array | None":
+    import jax
+
+    return None if seed is None else jax.random.key(seed)
+
+
+def link(text: str | None) -> tuple[int, int] | None:
+    """A link, from ``0-1``."""
+    if text is None:
+        return None
+    ends = re.fullmatch(r"(\d+)-(\d+)", text)
+    if not ends:
+        raise ValueError(f"--at must be two degrees of freedom, as 0-1, where 0 is ground; it was {text!r}.")
+    return int(ends[1]), int(ends[2])
+
+
+def units(given: Sequence[str] | None) -> dict[str, str] | None:
+    """Units by channel, from ``y=mm``."""
+    pairs = [text.rpartition("=") for text in given or ()]
+    for name, _, unit in pairs:
+        if not (name and unit):
+            raise ValueError(f"--unit must be a channel and its unit, as y=mm; it was {name or unit!r}.")
+    return {name: unit for name, _, unit in pairs} or None
+
+
+def check_outputs(outputs: Mapping[str, Path | None], inputs: Sequence[Path]) -> None:
+    """Refuse, before any work, what would end in a lost input or in no output."""
+    taken = {path.resolve(): "is an input of this command" for path in inputs}
+    for name, path in outputs.items():
+        if path is None:
+            continue
+        place = path.resolve()
+        if place in taken:
+            raise ValueError(f"{name} must not be a file that is needed: {path} {taken[place]}. Choose another name.")
+        if place.is_dir() or not place.parent.is_dir():
+            raise ValueError(f"{name} must be a file in a folder that exists; it was {path}. Make the folder first.")
+        taken[place] = f"is {name} already"
+
+
+def _channel_names(kind: str, given: Sequence[str] | None) -> str | list[str] | dict[int, str] | None:
+    """Names of the channels of a kind, as `jfsm.read` takes them; those written ``2=x2`` by degree of freedom."""
+    if not given:
+        return None
+    numbered = [re.fullmatch(r"(\d+)=(.+)", text) for text in given]
+    if not any(numbered):
+        return given[0] if len(given) == 1 else list(given)
+    names = {int(match[1]): match[2] for match in numbered if match}
+    if len(names) < len(given):
+        raise ValueError(
+            f"--{kind} must give each degree of freedom once, as 1=x1 and 2=x2, or none at all; it was "
+            f"{', '.join(given)}."
+        )
+    return names
+
+
+def _where(given: Sequence[str] | None) -> dict[str, str | float] | None:
+    """Values by column, from ``run=3`` and ``specimen=B``; what can be a number is one."""
+    found: dict[str, str | float] = {}
+    for text in given or ():
+        name, _, value = text.partition("=")
+        if not (name and value) or name in found:
+            raise ValueError(
+                f"--where must be a column and its value, as run=3, each column once; it was {', '.join(given or ())}."
+            )
+        try:
+            found[name] = float(value)
+        except ValueError:
+            found[name] = value
+    return found or None
