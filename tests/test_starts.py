@@ -182,6 +182,22 @@ def test_what_comes_to_rest_is_judged_while_it_moves():
     assert float(found.term.values[0]) == pytest.approx(0.4, rel=0.2)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_the_missing_force_of_a_decay_fades_with_it(seed: int):
+    time = np.arange(2000) * 0.03
+
+    def rate(_, y):
+        return [y[1], -9.0 * y[0] - 0.4 * y[1] - y[0] ** 3]
+
+    x, v = solve_ivp(rate, (0, time[-1]), [1.5, 0.0], t_eval=time, rtol=1e-9, atol=1e-10).y
+    noisy = x + 0.02 * np.std(x) * np.random.default_rng(seed).standard_normal(time.size)
+    model = jfsm.Structure.sdof(1.0, 9.0, 0.4)
+    latent = missing_force(model, prepare(jfsm.Record(time, displacement=noisy), model))
+    power = np.mean(x**6)
+    assert np.mean((latent.force[:, 0] - x**3) ** 2) < 0.15 * power
+    assert np.mean(latent.force[time > 45.0, 0] ** 2) < 1e-4 * power
+
+
 def test_regression_cannot_tell_a_constant_force_from_an_offset():
     r = record(lambda x, v: 1.0 + 0.0 * x)
     prepared, law = prepare(r, MODEL), jfsm.Preload(1.0, at=(0, 1))

@@ -3,8 +3,8 @@ r"""The force that a model lacks, as a hidden state: Kalman filter and Rauch-Tun
     M ẍ + C ẋ + K x + r = g,     ṙ = -r/τ + w,
 
 r is an Ornstein-Uhlenbeck process per degree of freedom, its amplitude and its memory τ chosen by likelihood among a
-few. Whatever the model says of nonlinear terms is inside r, and is taken off afterwards. This is for pictures and maps,
-not for the likelihood of a hypothesis.
+few, and whether it swells and fades with the motion, as in a decay. Whatever the model says of nonlinear terms is
+inside r, and is taken off afterwards. This is for pictures and maps, not for the likelihood of a hypothesis.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
 from jaxtyping import Array, Float
-from scipy.ndimage import maximum_filter1d
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from ..dynamics._along import force_along
 from ..dynamics._excitation import bucket
@@ -28,6 +28,10 @@ _MEMORIES = (0.15, 1.0)
 """τ of the latent force, in radians of the motion."""
 _AMPLITUDES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 """Its amplitude, as a share of the elastic force."""
+_SWELL = (1, 2)
+"""Powers of the motion's energy that the latent force's power may follow: of linear laws and of steeper ones."""
+_LEAST_SWELL = 1e-4
+"""Power of the latent force where nothing moves, as a share of its mean."""
 _WIDE = 10.0
 _CERTAIN = 5.0
 """Velocity, in its standard errors, from which something moves."""
@@ -108,16 +112,31 @@ def latent_force(
     ]
     stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *models)
     data = (jnp.asarray(true), jnp.asarray(seen), jnp.asarray(use))
-    likelihoods = np.asarray(_likelihoods(stacked, *data))
-    best = models[int(np.nanargmax(likelihoods))]
-    mean, std = (np.asarray(out) for out in _smooth(best, *data))
     dof = plant.dof
+    period = max(int(2 * np.pi / (omega * dt)), 1)
+
+    def most_likely(swell: np.ndarray) -> tuple[float, _Model, np.ndarray]:
+        likelihoods = np.asarray(_likelihoods(stacked, *data, jnp.asarray(swell)))
+        best = int(np.nanargmax(likelihoods))
+        return float(likelihoods[best]), models[best], swell
+
+    _, model, swell = even = most_likely(np.ones(padded))
+    mean, _ = (np.asarray(out) for out in _smooth(model, *data, jnp.asarray(swell)))
+    energy = np.mean(mean[:, :dof] ** 2 + (mean[:, dof : 2 * dof] / omega) ** 2, 1)
+    energy = gaussian_filter1d(np.where(np.arange(padded) < n, energy, 0.0), period, mode="nearest")
+    swelling = [most_likely(_scaled(energy**power, n)) for power in _SWELL]
+    _, model, swell = max(even, *swelling, key=lambda found: found[0])
+    mean, std = (np.asarray(out) for out in _smooth(model, *data, jnp.asarray(swell)))
     x, v, r = mean[:, :dof], mean[:, dof : 2 * dof], mean[:, 2 * dof :]
     known = np.asarray(force_along(plant, jnp.asarray(x), jnp.asarray(v), fine.time[:padded]))
     x, v, r, known, std = (q[:n] for q in (x, v, r, known, std))
-    period = max(int(2 * np.pi / (omega * dt)), 1)
     moves = maximum_filter1d(np.abs(v), period, axis=0) > _CERTAIN * std[:, dof : 2 * dof]
     return Latent(x, v, r - known, std[:, 2 * dof :], np.any(moves, 1))
+
+
+def _scaled(power: np.ndarray, n: int) -> np.ndarray:
+    """A power as a share of its mean over the first n samples."""
+    return np.maximum(power / np.mean(power[:n]), _LEAST_SWELL)
 
 
 def _on_time(plant: Plant, seen: np.ndarray, use: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
@@ -152,7 +171,8 @@ def _model(
     mass = np.diag(np.asarray(plant.mass))
     noise = np.zeros((n, n))
     noise[dof : 2 * dof, dof : 2 * dof] = minv @ np.diag(force_variance * dt**2) @ minv.T
-    noise[2 * dof :, 2 * dof :] = np.diag((amplitude * mass) ** 2 * -np.expm1(-2 * dt / tau))
+    wander = np.zeros((n, n))
+    wander[2 * dof :, 2 * dof :] = np.diag((amplitude * mass) ** 2 * -np.expm1(-2 * dt / tau))
     row = {
         "displacement": np.hstack([eye, zero, zero]),
         "velocity": np.hstack([zero, eye, zero]),
@@ -165,7 +185,7 @@ def _model(
     )
     sizes = np.concatenate([np.full(dof, length), np.full(dof, length * omega), amplitude * mass])
     start = np.diag((_WIDE * sizes) ** 2)
-    linear = LinearModel(*(jnp.asarray(a) for a in (step, noise, rows, variance, start)))
+    linear = LinearModel(*(jnp.asarray(a) for a in (step, noise, rows, variance, start, wander)))
     return _Model(linear, jnp.asarray(carried), jnp.asarray(through))
 
 
@@ -175,12 +195,12 @@ def _driven(model: _Model, force, values):
 
 
 @jax.jit
-def _likelihoods(models: _Model, force, values, use):
-    return jax.vmap(lambda m: log_likelihood(m.linear, *_driven(m, force, values), use))(models)
+def _likelihoods(models: _Model, force, values, use, swell):
+    return jax.vmap(lambda m: log_likelihood(m.linear, *_driven(m, force, values), use, swell))(models)
 
 
 @jax.jit
-def _smooth(model: _Model, force, values, use):
+def _smooth(model: _Model, force, values, use, swell):
     size = model.linear.step.shape[0]
-    mean, covariance = smoothed(model.linear, *_driven(model, force, values), use, jnp.eye(size))
+    mean, covariance = smoothed(model.linear, *_driven(model, force, values), use, jnp.eye(size), swell)
     return mean, jnp.sqrt(jnp.maximum(jnp.diagonal(covariance, axis1=1, axis2=2), 0.0))
