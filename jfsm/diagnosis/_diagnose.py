@@ -29,7 +29,7 @@ from ._lack_of_fit import LackOfFit
 from ._next import Leading
 from ._report import Tested, assemble
 from ._residual import residual, stand_in
-from ._search import LeftBehind, fit_model, search, search_pairs
+from ._search import Found, LeftBehind, fit_model, search, search_pairs, search_special_cases
 from ._trial import Trial
 from ._untold import untold
 
@@ -178,18 +178,19 @@ def _searched(
 ) -> _Searched:
     """Single effects fitted, the promising ones first, and pairs of them where that leaves something."""
     tried, left_out = promising(every)
-    trials, behind = search(tried, model, given, refitted, records, until, tell)
-    if settled([given, refitted, *trials], refitted):
-        best = max(trials, key=lambda t: t.evidence)
-        close = [t for t in trials if t is best or explained(t, refitted) >= GATE]
+    found = search(tried, model, given, refitted, records, until, tell)
+    if settled([given, refitted, *found.trials], refitted):
+        best = max(found.trials, key=lambda t: t.evidence)
+        close = [t for t in found.trials if t is best or explained(t, refitted) >= GATE]
         more = contained([law for t in close for law in t.laws], left_out)
     else:  # of a missing force that is ill seen regression may put the right law last
         more = [c for c in left_out if c.starts]
     if more:
-        found = search(more, model, given, refitted, records, until, tell)
-        trials, behind = [*trials, *found.trials], [*behind, *found.behind]
+        then = search(more, model, given, refitted, records, until, tell)
+        found = Found(found.trials + then.trials, found.behind + then.behind)
         left_out = [c for c in left_out if c not in more]
-    trials = [t.beside(refitted) for t in trials]
+    found = search_special_cases(every, found, model, records, until, tell)
+    trials, behind = [t.beside(refitted) for t in found.trials], found.behind
     louder = noise_beyond([given, refitted, *trials], records, until)
     trials = [t.amid(louder) for t in (given, refitted, *trials)]
     given, refitted, *trials = beside_chance(trials, model, records, until, key)

@@ -11,7 +11,7 @@ from .._threads import compiled_once, side_by_side
 from ..identification import LADDER, LANES, Maximum, Nuisances, Posterior, approach, finish, lanes_of, rungs
 from ..structures import Structure
 from ._adequacy import GATE, explained
-from ._candidates import Candidate, hypothesis
+from ._candidates import Candidate, hypothesis, special_cases
 from ._effect import Effect
 from ._pairs import instead, pairs
 from ._trial import Trial, trial
@@ -39,6 +39,10 @@ _ALONE = _Way((0.3, 0.03, 0.01), 10, 0.5)
 """Of single effects: the refit has been at the top already."""
 _TOGETHER = _Way((0.03, 0.01), 6, 0.25)
 """Of pairs: one of the two has been fitted already."""
+
+
+_FROM_THERE = _Way(LADDER[-1:], 1, 1.0)
+"""Of special cases of a law, from its numbers."""
 
 
 class LeftBehind(NamedTuple):
@@ -169,6 +173,25 @@ def search(
     most = sorted((candidate.share or 0.0 for candidate in tried), reverse=True)[:_PROMISING]
     kept = [lot for lot in lots if lot.share > 0 and lot.share >= most[-1]]
     return _climbed(lots, _ALONE, kept, refitted, tell)
+
+
+def search_special_cases(
+    every: Sequence[Candidate],
+    known: Found,
+    model: Structure,
+    records: Sequence[Nuisances],
+    until: Sequence[int],
+    tell: Callable[[str, int], None],
+) -> Found:
+    """The special cases of the best law fitted from its numbers as well: elsewhere they may have stopped on the way."""
+    best = max(known.trials, key=lambda t: t.evidence)
+    tried = [c for law in best.laws for c in special_cases(best.structure, law, every, model)]
+    if len(best.effects) > 1 or not tried:
+        return known
+    lots = [_Lot(beginnings, model, records, until, _FROM_THERE.ladder) for beginnings in groups(tried, None)]
+    trials = _best_of_each([*known.trials, *_climbed(lots, _FROM_THERE, lots, best, tell).trials])
+    done = {t.effects for t in trials}
+    return Found(trials, [one for one in known.behind if one.effects not in done])
 
 
 def search_pairs(

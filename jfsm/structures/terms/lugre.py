@@ -7,7 +7,7 @@ import jax.numpy as jnp
 
 from ..._types import as_scalar
 from .._term import ABOVE_ZERO, AbstractTerm, Parameter, Scalar, as_link
-from .coulomb import FORCE, SPEED, STATIC, gone_at_speed, stribeck_force
+from .coulomb import FORCE, SPEED, STATIC, Coulomb, Stribeck, gone_at_speed, stribeck_force
 
 
 class LuGre(AbstractTerm):
@@ -27,6 +27,7 @@ class LuGre(AbstractTerm):
     sigma1: Scalar = eqx.field(converter=as_scalar)
     at: tuple[int, int] = eqx.field(converter=as_link, static=True, kw_only=True)
     kind = "lugre"
+    contains = (Stribeck, Coulomb)  # of bristles that do not bend
     parameters = (
         FORCE,
         STATIC,

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 
 from ..._types import as_scalar
 from .._term import ABOVE_ZERO, AbstractTerm, Parameter, Scalar, as_link
+from .coulomb import Coulomb
 
 
 class SmoothCoulomb(AbstractTerm):
@@ -14,6 +15,7 @@ class SmoothCoulomb(AbstractTerm):
     v_s: Scalar = eqx.field(converter=as_scalar)
     at: tuple[int, int] = eqx.field(converter=as_link, static=True, kw_only=True)
     kind = "smooth_coulomb"
+    contains = (Coulomb,)
     parameters = (
         Parameter("F", force=1, meaning="friction force", least=0.0),
         Parameter("v_s", length=1, time=-1, meaning="speed at which it is fully there", least=ABOVE_ZERO),

@@ -1,0 +1,53 @@
+"""The fits behind a diagnosis: how hypotheses are followed to their tops."""
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+import jfsm
+from jfsm.diagnosis._candidates import Candidate, candidates, chosen_causes, special_cases
+from jfsm.diagnosis._effect import Effect
+from jfsm.diagnosis._search import Found, LeftBehind, fit_model, search, search_special_cases
+from jfsm.identification import prepare
+from jfsm.structures import Coulomb, Stribeck, causes
+
+MODEL = jfsm.Structure.sdof(1.0, 9.0, 0.3)
+
+
+def test_a_special_case_begins_from_the_numbers_of_the_law_that_holds_it():
+    found = MODEL.with_values({"stiffness@0-1.k": 8.0}) + Stribeck(2.0, 2.5, 0.1, at=(0, 1))
+    coulomb = Candidate((Effect(causes()["coulomb"], (0, 1)),), (MODEL + Coulomb(0.3, at=(0, 1)),))
+    spring = Candidate((Effect(causes()["cubic_hardening"], (0, 1)),), (MODEL + jfsm.CubicStiffness(1.0, at=(0, 1)),))
+    (case,) = special_cases(found, found.terms[-1], [coulomb, spring], MODEL)
+    assert case.effects == coulomb.effects
+    assert case.starts[0].values() == MODEL.values() | {"coulomb@0-1.F": 2.0}
+    assert case.own == MODEL.values() | {"stiffness@0-1.k": 8.0}
+
+
+def test_a_special_case_that_stopped_on_its_way_is_fitted_from_the_law_that_holds_it():
+    time = np.arange(600) * 0.06
+
+    def force(t):
+        return 4 * np.cos(1.1 * t) + 3 * np.sin(2.3 * t + 1) + 3 * np.cos(3.7 * t + 2)
+
+    def rate(t, y):
+        return [y[1], force(t) - 9.0 * y[0] - 0.3 * y[1] - 0.8 * np.tanh(y[1] / 1e-3)]
+
+    x = solve_ivp(rate, (0, time[-1]), [0.0, 0.0], t_eval=time, method="LSODA", rtol=1e-8, atol=1e-10).y[0]
+    noise = 0.01 * np.random.default_rng(1).standard_normal((2, time.size))
+    record = jfsm.Record(time, force(time) + 4 * noise[0], x + np.std(x) * noise[1], at_rest=True)
+    records, until = [prepare(record, MODEL)], [time.size]
+    given, refitted = fit_model(MODEL, records, until)
+    every = candidates(MODEL, records, chosen_causes(["stribeck", "coulomb"]))
+    stribeck, coulomb = (next(c for c in every if c.effects[0].cause.id == name) for name in ("stribeck", "coulomb"))
+
+    def tell(what, steps):
+        pass
+
+    alone = search([stribeck], MODEL, given, refitted, records, until, tell)
+    stopped = Found(alone.trials, [LeftBehind(coulomb.effects, 613.0)])
+    found = search_special_cases(every, stopped, MODEL, records, until, tell)
+    evidence = {t.effects[0].cause.id: t.evidence for t in found.trials}
+    assert found.behind == []
+    assert 0.0 < evidence["coulomb"] - evidence["stribeck"] < 10.0
+    (value,) = (t.structure.values()["coulomb@0-1.F"] for t in found.trials if t.effects == coulomb.effects)
+    assert abs(value - 0.8) < 0.05
