@@ -195,6 +195,24 @@ def test_what_the_motion_leaves_untold_is_no_finding(why_not: str, verdict: str)
     assert decision.verdict == verdict and decision.why[id(found)] == why_not
 
 
+@pytest.mark.parametrize(("power", "verdict"), [(0.0, "cause"), (0.004, "undecided")])
+def test_a_load_that_may_stand_for_the_drive_yields_to_whatever_leaves_nothing(power: float, verdict: str):
+    load, drift = trial(9040.0, 0.0, "periodic_disturbance"), trial(9000.0, power, "damping_drift")
+    decision = decide(
+        GIVEN,
+        REFITTED,
+        [load, drift],
+        lambda t: None,
+        lambda t: Unfit(0.0),
+        periods=100.0,
+        untold=lambda t: "keeps time" if t is load else "",
+        in_step=lambda t: t is load,
+    )
+    assert decision.verdict == verdict
+    if verdict == "cause":
+        assert decision.winner is drift and decision.share(load) == 0.0 and "noisy drive" in decision.why[id(load)]
+
+
 @pytest.mark.parametrize(("gained", "verdict"), [(7.0, "parameters"), (14.0, "cause")])
 def test_a_law_is_not_named_only_because_own_values_would_be_far_off_without_it(gained: float, verdict: str):
     own = Unknown("stiffness@0-1.k", 0.0, 1.0, True, 0.0, 0.02, degrees=1.5, low=-3.9, high=3.9)

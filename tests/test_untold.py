@@ -8,7 +8,7 @@ import pytest
 
 import jfsm
 from jfsm.diagnosis._effect import Effect
-from jfsm.diagnosis._untold import untold
+from jfsm.diagnosis._untold import in_step, untold
 from jfsm.identification import prepare
 from jfsm.structures import ParametricStiffness, PeriodicDisturbance
 
@@ -43,6 +43,13 @@ def test_under_a_single_line_a_load_that_keeps_time_with_it_may_be_any_law(omega
 def test_under_a_single_line_a_spring_that_keeps_time_with_it_may_be_any_law_too():
     spring = ParametricStiffness(dk=1.0, omega=2 * LINE, phase=0.0, at=(0, 1))
     assert untold([nuisances(50.0 * np.cos(LINE * TIME))])(hypothesis("parametric_stiffness", spring))
+
+
+@pytest.mark.parametrize(("omega", "steps"), [(LINE, True), (LINE + 0.05, True), (2 * LINE, False), (17.0, False)])
+def test_a_load_is_in_step_with_a_single_line_of_its_frequency(omega: float, steps: bool):
+    assert in_step([nuisances(50.0 * np.cos(LINE * TIME))])(load(omega)) == steps
+    assert not in_step([nuisances(50.0 * np.cos(LINE * TIME) + 20.0 * np.cos(22.0 * TIME))])(load(omega))
+    assert not in_step([nuisances(None)])(load(omega))
 
 
 @pytest.mark.parametrize("other", [1.3 * LINE, 3 * LINE])

@@ -22,6 +22,7 @@ from ._standing import special_case, why_not
 from ._trial import Trial
 
 _NOT_RIGHT = "explains much of it, but is not of the right shape"
+_IN_STEP = "takes the place of a noisy drive, with which it is in step"
 _ALIKE = 0.3
 """Probability of another law of its family, in those of a law that is not of the right shape, that may take its place.
 """
@@ -65,6 +66,7 @@ def decide(
     imposed: bool = False,
     forgiven: bool = False,
     untold: Callable[[Trial], str] = lambda t: "",
+    in_step: Callable[[Trial], bool] = lambda t: False,
 ) -> Decision:
     """Verdict over the model as given, the model refitted, every candidate, and a map that stands for any law.
 
@@ -73,9 +75,10 @@ def decide(
     Where some force is `forgiven` to all none of them is right: laws of time would explain whatever is left, and a map
     of the little that a law leaves does not speak against it. Along an `imposed` motion a map repeats even the small
     faults of a law, one by one, as often as it repeats itself. What the motion leaves `untold`, and why, is a
-    rival, and no finding.
+    rival, and no finding. What is `in_step` with a drive, whose place it may take, is not even that where anything else
+    leaves nothing but noise.
     """
-    ranked = _Ranked(given, refitted, tried, periods, forgiven)
+    ranked = _Ranked(given, refitted, tried, periods, forgiven, in_step)
     winner = ranked.best()
     stands = imposed and bool(winner.effects) and almost_all(winner, refitted)
     stands |= forgiven and bool(winner.effects) and explained(winner, refitted) >= NEARLY_ALL
@@ -125,13 +128,25 @@ def families(t: Trial) -> list[str]:
 class _Ranked:
     """Candidates, why each is not named, how much it explains, and how probable those are that may be."""
 
-    def __init__(self, given: Trial, refitted: Trial, tried: Sequence[Trial], periods: float, forgiven: bool):
+    def __init__(
+        self,
+        given: Trial,
+        refitted: Trial,
+        tried: Sequence[Trial],
+        periods: float,
+        forgiven: bool,
+        in_step: Callable[[Trial], bool],
+    ):
         self.tried = [given, refitted, *tried]
         self.kappa = {id(t): explained(t, refitted) for t in tried}
-        self.why = {id(t): why_not(t, tried, given, refitted) for t in tried}
+        told = [t for t in tried if not in_step(t)]
+        self.why = {id(t): why_not(t, told, given, refitted) for t in tried}
         for t in tried:
             if forgiven and any(law.timed for law in t.laws):
                 self.why[id(t)] = self.why[id(t)] or "depends on time, and no second record shows the same"
+        if any(adequate(t) and not self.why.get(id(t)) for t in (given, refitted, *told)):
+            for t in tried:
+                self.why[id(t)] = self.why[id(t)] or (_IN_STEP if in_step(t) else "")
         self.passing = [t for t in tried if not self.why[id(t)]]
         self.alternatives = [given, refitted, *self.passing]
         share = probabilities(self.alternatives, periods)

@@ -31,7 +31,7 @@ from ._report import Tested, assemble
 from ._residual import residual, stand_in
 from ._search import Found, LeftBehind, fit_model, search, search_pairs, search_special_cases
 from ._trial import Trial
-from ._untold import untold
+from ._untold import in_step, untold
 
 _HEAVIER = 0.03
 _WORSE = 1.5
@@ -177,10 +177,15 @@ def _searched(
     pairs: bool,
 ) -> _Searched:
     """Single effects fitted, the promising ones first, and pairs of them where that leaves something."""
+    stands_for_the_drive = in_step(records)
+
+    def told(trials: Sequence[Trial]) -> list[Trial]:
+        return [t for t in (given, refitted, *trials) if not stands_for_the_drive(t)]
+
     tried, left_out = promising(every)
     found = search(tried, model, given, refitted, records, until, tell)
-    if settled([given, refitted, *found.trials], refitted):
-        best = max(found.trials, key=lambda t: t.evidence)
+    if settled(told(found.trials), refitted):
+        best = max(told(found.trials), key=lambda t: t.evidence)
         close = [t for t in found.trials if t is best or explained(t, refitted) >= GATE]
         more = contained([law for t in close for law in t.laws], left_out)
     else:  # of a missing force that is ill seen regression may put the right law last
@@ -189,14 +194,15 @@ def _searched(
         then = search(more, model, given, refitted, records, until, tell)
         found = Found(found.trials + then.trials, found.behind + then.behind)
         left_out = [c for c in left_out if c not in more]
-    found = search_special_cases(every, found, model, records, until, tell)
+    best = max(told(found.trials), key=lambda t: t.evidence)
+    found = search_special_cases(best, every, found, model, records, until, tell)
     trials, behind = [t.beside(refitted) for t in found.trials], found.behind
     louder = noise_beyond([given, refitted, *trials], records, until)
     trials = [t.amid(louder) for t in (given, refitted, *trials)]
     given, refitted, *trials = beside_chance(trials, model, records, until, key)
     lack = LackOfFit(records, until)
     imposed = records[0].path is not None
-    effects = _beside([given, refitted, *trials], refitted, every, lack, imposed=imposed) if pairs else []
+    effects = _beside(told(trials), refitted, every, lack, imposed=imposed) if pairs else []
     if effects:
         found = search_pairs(effects, trials, model, refitted, records, until, tell)
         trials = [given, refitted, *trials, *(t.beside(refitted).amid(louder) for t in found.trials)]
@@ -215,7 +221,8 @@ def _decided(
         mapped = partial(stand_in, records=records, until=until)
         return decide(found.given, found.refitted, found.trials, mapped, found.lack, periods, **how)
 
-    decision = decision_of(found, imposed=records[0].path is not None, untold=untold(records))
+    imposed = records[0].path is not None
+    decision = decision_of(found, imposed=imposed, untold=untold(records), in_step=in_step(records))
     again = None if decision.winner.effects else forgiving(found.every, records, until)
     if again is None:
         return records, found, decision

@@ -176,6 +176,7 @@ def search(
 
 
 def search_special_cases(
+    best: Trial,
     every: Sequence[Candidate],
     known: Found,
     model: Structure,
@@ -184,9 +185,8 @@ def search_special_cases(
     tell: Callable[[str, int], None],
 ) -> Found:
     """The special cases of the best law fitted from its numbers as well: elsewhere they may have stopped on the way."""
-    best = max(known.trials, key=lambda t: t.evidence)
     tried = [c for law in best.laws for c in special_cases(best.structure, law, every, model)]
-    if len(best.effects) > 1 or not tried:
+    if not tried:
         return known
     lots = [_Lot(beginnings, model, records, until, _FROM_THERE.ladder) for beginnings in groups(tried, None)]
     trials = _best_of_each([*known.trials, *_climbed(lots, _FROM_THERE, lots, best, tell).trials])

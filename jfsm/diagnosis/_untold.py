@@ -1,7 +1,8 @@
 """What the motion of a single record cannot tell apart, however large the difference in evidence.
 
 In one decay amplitude goes with time. Under one steady line whatever a law does goes with that line and its overtones,
-as a load of that frequency would.
+as a load of that frequency would. And a load of the line itself takes the place of the measured force without that
+one's noise, so that it is the more probable whatever the cause is.
 """
 
 from collections.abc import Callable, Sequence
@@ -9,6 +10,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..identification import Nuisances
+from ..structures import AbstractTerm, PeriodicDisturbance
 from ._trial import Trial
 
 _DECAY = "changes with time, which a single decay does not tell from a change with amplitude"
@@ -22,24 +24,35 @@ _OVERTONES = 9
 
 def untold(records: Sequence[Nuisances]) -> Callable[[Trial], str]:
     """Tells of a hypothesis why these records, however well it explains them, do not show it; nothing if they do."""
-    if len(records) > 1 or records[0].path is not None:
-        return lambda t: ""
-    if not records[0].driven:
+    if len(records) == 1 and not records[0].driven and records[0].path is None:
         return lambda t: _DECAY if any(effect.cause.family == "time" for effect in t.effects) else ""
-    line = _single_line(records[0])
+    order_of = _orders(records)
+    return lambda t: _LINE if any(law.timed and order_of(law) for law in t.laws) else ""
+
+
+def in_step(records: Sequence[Nuisances]) -> Callable[[Trial], bool]:
+    """Tells of a hypothesis whether it has a load of the drive's own line, where that is single."""
+    order_of = _orders(records)
+    return lambda t: any(isinstance(law, PeriodicDisturbance) and order_of(law) == 1 for law in t.laws)
+
+
+def _orders(records: Sequence[Nuisances]) -> Callable[[AbstractTerm], int]:
+    """Tells of a law which overtone of a single line its frequency is; 0 for none, or where there is no such line."""
+    line = _single_line(records[0]) if len(records) == 1 and records[0].path is None else None
     if line is None:
-        return lambda t: ""
+        return lambda law: 0
     bin_width = 2 * np.pi / records[0].record.duration
 
-    def keeps_time(omega: float) -> bool:
+    def order_of(law: AbstractTerm) -> int:
+        omega = float(getattr(law, "omega", 0.0))
         order = round(omega / line)
-        return 1 <= order <= _OVERTONES and abs(omega - order * line) < _NEAR * bin_width
+        return order if 1 <= order <= _OVERTONES and abs(omega - order * line) < _NEAR * bin_width else 0
 
-    return lambda t: _LINE if any(law.timed and keeps_time(float(getattr(law, "omega", 0.0))) for law in t.laws) else ""
+    return order_of
 
 
 def _single_line(nuisances: Nuisances) -> float | None:
-    """Angular frequency [rad/s] of a drive that is a single line; None where there is more to it."""
+    """Angular frequency [rad/s] of a drive that is a single line; None where there is more to it, or no drive."""
     forces = [y - np.mean(y) for (kind, _), y in nuisances.record.channels.items() if kind == "force"]
     if nuisances.record.base_acceleration is not None:
         forces.append(nuisances.record.base_acceleration - np.mean(nuisances.record.base_acceleration))
