@@ -218,6 +218,7 @@ def _powers(posterior: Posterior, theta: np.ndarray, gone: np.ndarray, slack: fl
         for chosen in sets(nuisances, posterior.until[index]):
             mask = (scored & chosen)[:, None] & alive
             for found, readings in ((left, error), (moved, there - error)):
-                power = np.where(mask, (readings / extent(nuisances)) ** 2, 0.0)
+                with np.errstate(over="ignore"):  # of a motion that runs away
+                    power = np.where(mask, (readings / extent(nuisances)) ** 2, 0.0)
                 found.append(np.sum(np.sum(power, 0) / np.maximum(mask.sum(0), 1)))
     return np.array(left), np.array(moved)
