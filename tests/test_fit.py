@@ -255,3 +255,14 @@ def test_two_stiffnesses_that_only_their_difference_is_known_of_are_said_to_be_s
     words = jfsm.fit(wells, record, fixed="mass").identifiability
     tied = [w for w in words if "cannot be told apart" in w]
     assert len(tied) == 1 and "double_well@0-1.k_neg - stiffness@0-1.k can" in tied[0]
+
+
+def test_steps_follow_a_spring_that_hardens_many_times_over():
+    """At the peaks of the decay its frequency is ten times that of small motions."""
+    time = np.arange(600) * 0.1
+    x, _ = smooth_motion(1.0, lambda x, v: x + 0.02 * v + 8.0 * x**3, lambda t: np.zeros(1), time, 2.0, 0.0)
+    x = x[:, 0] + 1e-3 * x.std() * np.random.default_rng(0).standard_normal(time.size)
+    model = jfsm.Structure.sdof(1.0, 1.0, 0.02) + jfsm.CubicStiffness(7.0, at=(0, 1))
+    found = jfsm.fit(model, jfsm.Record(time, displacement=x), fixed=["mass"])
+    assert found.values["stiffness@0-1.k"] == pytest.approx(1.0, abs=0.03)
+    assert found.values["cubic_stiffness@0-1.k3"] == pytest.approx(8.0, abs=0.03)

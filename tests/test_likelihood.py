@@ -236,6 +236,12 @@ def test_steps_are_short_enough_for_the_stiffest_structure_asked_for_and_the_dri
     assert finer.readings is chain_nuisances.readings
 
 
+@pytest.mark.parametrize("at", [(0, 1), (1, 2)])
+def test_steps_follow_a_spring_that_hardens_wherever_it_is(at, chain_nuisances):
+    stiff = MODEL + jfsm.CubicStiffness(1e6, at=at)
+    assert chain_nuisances.resolving([stiff]).fine.substeps >= 4 * chain_nuisances.fine.substeps
+
+
 def test_the_start_is_first_guessed_from_what_is_measured(chain_nuisances):
     first = np.asarray(chain_nuisances.readings.values)[0]
     shown = [first[i] for i, (kind, _) in enumerate(chain_nuisances.channels) if kind == "displacement"]

@@ -1,7 +1,8 @@
 """What drives a run, taken from a record."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -19,12 +20,34 @@ _STEP_ANGLE = 0.22
 """Largest angle of the fastest mode per step [rad]: Runge-Kutta of order four then shifts a frequency by 2e-5."""
 _MOST_SUBSTEPS = 16
 _MOST_STIFF_SUBSTEPS = 64
-PROBES = ((0.0, 1.0), (1.0, 1.0), (-1.0, 1.0), (3.0, 2.0), (-3.0, 2.0))
-"""Velocities, in usual speeds, at which to ask what is faster than the linear part, and its largest angle per step.
 
-It follows something slow, and need not be followed closely; at the largest speeds it is over so soon that it need only
-stay stable.
-"""
+
+class Probe(NamedTuple):
+    """A state, in usual sizes, at which to ask what is faster than the linear part; its largest angle per step."""
+
+    displacement: float
+    velocity: float
+    angle: float
+
+
+_PROBES = (
+    # What is fast at some speed follows something slow, and need not be followed closely; at the largest speeds it is
+    # over so soon that it need only stay stable.
+    Probe(0.0, 0.0, 1.0),
+    *(Probe(0.0, share, 1.0) for share in (1.0, -1.0)),
+    *(Probe(0.0, share, 2.0) for share in (3.0, -3.0)),
+    # A spring that hardens is the motion itself, for a part of each swing.
+    *(Probe(share, 0.0, 0.3) for share in (2.0, -2.0)),
+)
+
+
+class Size(NamedTuple):
+    """Usual displacement [m] and velocity [m/s] of a motion."""
+
+    displacement: float
+    velocity: float
+
+
 _KINKED_SUBSTEPS = 2
 """Steps per sample at least for hidden states, which yield and slide at instants of their own."""
 _CREST = 4.0
@@ -47,11 +70,21 @@ def fastest_mode(plant: Plant) -> float:
     return float(np.sqrt(np.max(np.abs(eigenvalues))))
 
 
-def substeps_for(structure: Structure, dt: float, speed: float = 0.0) -> int:
+def probes(dof: int, size: Size) -> Iterator[tuple[np.ndarray, np.ndarray, float]]:
+    """Displacements and velocities (dof,) at which to ask what is fast, and the largest angle per step there.
+
+    Masses move together, and neighbours against each other.
+    """
+    for pattern in (np.ones(dof), 0.5 * (-1.0) ** np.arange(dof))[: min(dof, 2)]:
+        for x, v, angle in _PROBES:
+            yield x * size.displacement * pattern, v * size.velocity * pattern, angle
+
+
+def substeps_for(structure: Structure, dt: float, size: Size | None = None) -> int:
     """Steps per sample, a power of two, that keep the angle per step of the fastest mode or decay small.
 
-    Laws beside the linear ones may be faster, at rest or at about `speed`: bristles, a friction that turns over
-    steeply. For these the steps may be longer.
+    Laws beside the linear ones may be faster, at rest or in motions of about this `size`: bristles, a friction that
+    turns over steeply, a spring that hardens. For these the steps may be longer.
 
     Raises
     ------
@@ -60,7 +93,7 @@ def substeps_for(structure: Structure, dt: float, speed: float = 0.0) -> int:
     """
     plant, zero = numbers_of(structure), np.zeros(structure.dof)
     linear = [term for term in structure.terms if isinstance(term, LinearStiffness | LinearDamping)]
-    fastest = _fastest_rate(numbers_of(Structure(structure.mass, linear)), zero)
+    fastest = _fastest_rate(numbers_of(Structure(structure.mass, linear)), zero, zero)
     if fastest * dt / _MOST_SUBSTEPS > _STABLE_ANGLE:
         raise ValueError(
             f"`model` must move slowly enough for the record's steps of {dt:.6g} s; its fastest mode or decay has "
@@ -71,16 +104,15 @@ def substeps_for(structure: Structure, dt: float, speed: float = 0.0) -> int:
     most = _MOST_SUBSTEPS
     if len(plant.smooth) or len(plant.memory):
         need = max(need, _KINKED_SUBSTEPS if len(plant.memory) else 1)
-        for share, angle in PROBES:
-            need = max(need, _fastest_rate(plant, zero + share * speed) * dt / angle)
+        for x, v, angle in probes(structure.dof, size or Size(0.0, 0.0)):
+            need = max(need, _fastest_rate(plant, x, v) * dt / angle)
         most = _MOST_STIFF_SUBSTEPS
     return min(most, 2 ** math.ceil(math.log2(need)))
 
 
-def _fastest_rate(plant: Plant, v: np.ndarray) -> float:
-    """Largest eigenvalue [rad/s] of a plant's motion about x = 0 at velocity `v`; friction that sticks is left out."""
-    dof = plant.dof
-    return float(np.max(np.abs(np.linalg.eigvals(np.asarray(relaxed_jacobian(plant, np.zeros(dof), v))))))
+def _fastest_rate(plant: Plant, x: np.ndarray, v: np.ndarray) -> float:
+    """Largest eigenvalue [rad/s] of a plant's motion about a state; friction that sticks is left out."""
+    return float(np.max(np.abs(np.linalg.eigvals(np.asarray(relaxed_jacobian(plant, x, v))))))
 
 
 @eqx.filter_jit
@@ -89,21 +121,22 @@ def relaxed_jacobian(plant: Plant, x, v):
     return linearised(plant, inverse_mass(plant), x, v, hidden_start(plant, x, v), jnp.zeros_like(x), jnp.zeros(()))[1]
 
 
-def typical_speed(record: Record) -> float:
-    """Size of the velocity, from whatever response there is; 0 where there is none.
+def typical_size(record: Record) -> Size:
+    """Size of the motion, from whatever response there is; 0 where there is none.
 
     Of a decay it is that of its beginning.
     """
-    speeds = []
+    found = [Size(0.0, 0.0)]
     for (kind, _), y in record.responses.items():
-        change, spread = _size(np.diff(y)) / record.dt, _size(y)
-        if kind == "velocity":
-            speeds.append(spread)
-        elif kind == "displacement":
-            speeds.append(change)
-        elif change > 0:
-            speeds.append(spread**2 / change)
-    return float(max(speeds, default=0.0))
+        spread, change = _size(y), _size(np.diff(y)) / record.dt
+        time = spread / change if change > 0 else 0.0
+        by_kind = {
+            "displacement": Size(spread, change),
+            "velocity": Size(spread * time, spread),
+            "acceleration": Size(spread * time**2, spread * time),
+        }
+        found.append(by_kind[kind])
+    return Size(*(max(sizes) for sizes in zip(*found, strict=True)))
 
 
 def _size(y: np.ndarray) -> float:

@@ -25,7 +25,7 @@ from scipy.sparse import csr_array, diags_array
 
 from ..records import NoiseFloor, Record, noise_floor, spikes
 from ..structures import AbstractSensor, AccelerationBias, AccelerationGain, ChannelDelay, Offset, Structure
-from ._excitation import substeps_for
+from ._excitation import Size, substeps_for
 
 _DEGREE = 5
 _ACTIVE = _DEGREE + 1
@@ -176,9 +176,9 @@ def imposed_motion(record: Record, structure: Structure) -> Path:
     return Path(record, tuple(splines), tuple(errors), tuple(notes))
 
 
-def imposed_substeps(structure: Structure, dt: float, speed: float) -> int:
-    """Steps per sample that the hidden states of a structure need along a motion of about `speed`."""
-    return substeps_for(Structure(np.full(structure.dof, _HEAVY), structure.terms), dt, speed)
+def imposed_substeps(structure: Structure, dt: float, size: Size) -> int:
+    """Steps per sample that the hidden states of a structure need along a motion of about this size."""
+    return substeps_for(Structure(np.full(structure.dof, _HEAVY), structure.terms), dt, size)
 
 
 def noise_of(floor: NoiseFloor, size: float) -> float:

@@ -15,14 +15,14 @@ from ..records import Record
 from ..structures import MapTerm, Structure
 from ._drive import Reconstruction
 from ._excitation import (
-    PROBES,
     bucket,
     excitation,
     force_limits,
     measured_force,
+    probes,
     relaxed_jacobian,
     substeps_for,
-    typical_speed,
+    typical_size,
 )
 from ._grid import Fine, free_run
 from ._linearise import state_matrix
@@ -108,8 +108,8 @@ def simulate_many(
         raise ValueError(
             f"`initial_states` must hold one state, or one for each of the {len(structures)} structures; got {len(x0)}."
         )
-    speed, asked = typical_speed(record), structures if len(structures) == 1 else _fastest(structures, record)
-    steps = substeps or finer(max(substeps_for(structure, record.dt, speed) for structure in asked))
+    size, asked = typical_size(record), structures if len(structures) == 1 else _fastest(structures, record)
+    steps = substeps or finer(max(substeps_for(structure, record.dt, size) for structure in asked))
     plants = _lowered(structures, Grid(record.dt, steps))
     force = measured_force(record, dof, force_limits(structures[0]))
     fine = excitation(record, dof, steps, reconstruction, length=bucket(len(record)), force=force)
@@ -199,12 +199,11 @@ def _alone(slots: Slots) -> Slots:
 
 def _fastest(structures: Sequence[Structure], record: Record) -> list[Structure]:
     """Of each measure that the number of steps goes by, the structure that needs most; the rest need not be asked."""
-    plants, speed = _lowered(structures, Grid(record.dt, 1)), typical_speed(record)
+    plants, size = _lowered(structures, Grid(record.dt, 1)), typical_size(record)
     mass, damping, stiffness = (np.asarray(q) for q in (plants.mass, plants.damping, plants.stiffness))
     slopes = [state_matrix(np.linalg.solve(mass, stiffness), np.linalg.solve(mass, damping))]
     if len(plants.smooth) or len(plants.memory):
-        probes = [jnp.full(mass.shape[-1], share * speed) for share, _ in PROBES]
-        slopes += [np.asarray(_jacobians(plants, v)) for v in probes]
+        slopes += [np.asarray(_jacobians(plants, x, v)) for x, v, _ in probes(mass.shape[-1], size)]
     return [structures[int(np.argmax(np.max(np.abs(np.linalg.eigvals(slope)), axis=-1)))] for slope in slopes]
 
 
@@ -221,8 +220,8 @@ def _axes(plants: Plant) -> Any:
 
 
 @eqx.filter_jit
-def _jacobians(plants: Plant, v):
-    return jax.vmap(lambda plant: relaxed_jacobian(plant, jnp.zeros_like(v), v), in_axes=(_axes(plants),))(plants)
+def _jacobians(plants: Plant, x, v):
+    return jax.vmap(lambda plant: relaxed_jacobian(plant, x, v), in_axes=(_axes(plants),))(plants)
 
 
 @eqx.filter_jit

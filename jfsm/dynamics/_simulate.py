@@ -27,7 +27,7 @@ from ..structures import (
 )
 from ..surrogates import AbstractForceStateMap, tabulate
 from ._drive import Reconstruction
-from ._excitation import bucket, excitation, force_limits, measured_force, substeps_for, typical_speed
+from ._excitation import bucket, excitation, force_limits, measured_force, substeps_for, typical_size
 from ._grid import Fine, punctual, run_grid, true_force
 from ._imposed import imposed_motion, imposed_substeps
 from ._needed import force_needed
@@ -158,7 +158,7 @@ def simulate(
     channels = tuple(record.responses)
     exact = lower(model, channels)
     fixed = bool(len(exact.friction) or len(exact.delayed))  # what sticks or answers the past has a scheme of its own
-    substeps = finer(substeps_for(model, record.dt, typical_speed(record)))
+    substeps = finer(substeps_for(model, record.dt, typical_size(record)))
     force = measured_force(record, model.dof, force_limits(model))
     fine = excitation(record, model.dof, substeps, reconstruction, length=bucket(len(record)), force=force)
     x0, v0 = starting_state(model, record, initial_state, window=window, reconstruction=reconstruction)
@@ -214,7 +214,7 @@ def with_tables(model: Structure) -> Structure:
 def _imposed_response(model: Structure, record: Record) -> Response:
     """The motion of a record, and the force that it needs."""
     path, channels = imposed_motion(record, model), tuple(record.channels)
-    substeps = finer(imposed_substeps(model, record.dt, typical_speed(record)))
+    substeps = finer(imposed_substeps(model, record.dt, typical_size(record)))
     # Gain and delay of the force's sensor concern readings only.
     plain = [s for s in model.sensors if not isinstance(s, ForceGain | ForceDelay)]
     structure = Structure(model.mass, model.terms, plain, model.trust)

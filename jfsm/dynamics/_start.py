@@ -12,7 +12,7 @@ from .._types import as_array
 from ..records import Record
 from ..structures import Structure
 from ._drive import Reconstruction
-from ._excitation import bucket, excitation, substeps_for, typical_speed
+from ._excitation import bucket, excitation, substeps_for, typical_size
 from ._grid import free_run
 from ._plant import Channel, Grid, lower, readout
 
@@ -60,7 +60,7 @@ def _least_squares(model: Structure, head: Record, reconstruction: Reconstructio
     y = np.column_stack([head.responses[c] for c in channels])
     spread = np.maximum(np.std(y, axis=0), 1e-12 * np.max(np.abs(y)) + 1e-300)
     padded = bucket(len(head))
-    substeps = substeps_for(model, head.dt, typical_speed(head))
+    substeps = substeps_for(model, head.dt, typical_size(head))
     fine = excitation(head, model.dof, substeps, reconstruction, length=padded)
     counted = jnp.asarray(np.arange(padded) < len(head), dtype=jnp.float64)
     plant, show = lower(model, channels, grid=Grid(head.dt, substeps), rolled=True), readout(channels, model.dof)

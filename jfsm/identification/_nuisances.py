@@ -15,7 +15,7 @@ from ..dynamics._excitation import (
     force_limits,
     measured_force,
     substeps_for,
-    typical_speed,
+    typical_size,
 )
 from ..dynamics._grid import Fine
 from ..dynamics._imposed import Imposed, Path, imposed_motion, imposed_substeps, noise_of
@@ -151,9 +151,9 @@ class Nuisances:
     def resolving(self, structures: Sequence[Structure]) -> "Nuisances":
         """The same record with steps short enough for all of these structures."""
         record, fine = self.record, self.fine
-        speed = typical_speed(record)
+        size = typical_size(record)
         steps_for = substeps_for if self.path is None else imposed_substeps
-        need = max(steps_for(structure, record.dt, speed) for structure in structures)
+        need = max(steps_for(structure, record.dt, size) for structure in structures)
         if need <= fine.substeps:
             return self
         if self.path is not None:
@@ -278,7 +278,7 @@ def _prepare_imposed(record: Record, model: Structure, reconstruction: Reconstru
         record=record,
         channels=channels,
         show=readout(channels, model.dof),
-        fine=path.imposed(imposed_substeps(model, record.dt, typical_speed(record)), bucket(len(record))),
+        fine=path.imposed(imposed_substeps(model, record.dt, typical_size(record)), bucket(len(record))),
         readings=_padded(values, use, floor**2),
         noise=ProcessNoise(jnp.zeros((model.dof, model.dof))),
         force_variance=none[:0],
@@ -378,7 +378,7 @@ def _start(record: Record, model: Structure, reconstruction: Reconstruction) -> 
 
 def _drive(record: Record, model: Structure, reconstruction: Reconstruction, force: np.ndarray) -> Fine:
     """Drive by these samples of the force, in steps short enough for the model, as long as the padded readings."""
-    substeps = substeps_for(model, record.dt, typical_speed(record))
+    substeps = substeps_for(model, record.dt, typical_size(record))
     return excitation(record, model.dof, substeps, reconstruction, length=bucket(len(record)), force=force)
 
 
