@@ -137,7 +137,7 @@ def judged(rig: Rig, folder: Path) -> dict:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("rigs", nargs="*", default=["all"], choices=["all", *RIGS], metavar="RIG")
+    parser.add_argument("rigs", nargs="*", default="all", choices=["all", *RIGS], metavar="RIG")
     default = Path(os.environ.get("JFSM_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
     parser.add_argument("--data", type=Path, default=default)
     parser.add_argument("--out", type=Path, default=Path("rig_verdicts"), help="folder of records, models and pages")
