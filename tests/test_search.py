@@ -45,7 +45,7 @@ def test_a_special_case_that_stopped_on_its_way_is_fitted_from_the_law_that_hold
 
     alone = search([stribeck], MODEL, given, refitted, records, until, tell)
     stopped = Found(alone.trials, [LeftBehind(coulomb.effects, 613.0)])
-    found = search_special_cases(alone.trials[0], every, stopped, MODEL, records, until, tell)
+    found = search_special_cases(alone.trials, every, stopped, MODEL, records, until, tell)
     evidence = {t.effects[0].cause.id: t.evidence for t in found.trials}
     assert found.behind == []
     assert 0.0 < evidence["coulomb"] - evidence["stribeck"] < 10.0

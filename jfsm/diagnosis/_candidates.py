@@ -152,18 +152,18 @@ def contained(laws: Sequence[AbstractTerm], among: Sequence[Candidate]) -> list[
 def special_cases(found: Structure, law: AbstractTerm, among: Sequence[Candidate], model: Structure) -> list[Candidate]:
     """What a law that was found is for certain of its numbers, beginning from the numbers and own values found."""
     values = found.values()
-    own, numbers = {path: values[path] for path in model.entries()}, dict(zip(names(law), law.values, strict=True))
+    own, numbers = {path: values[path] for path in model.entries()}, dict(zip(_names(law), law.values, strict=True))
     cases = []
     for c in contained([law], among):
         start = c.starts[0]
         placed = start.terms[-1]
-        special = {name: numbers.get(name, value) for name, value in zip(names(placed), placed.values, strict=True)}
+        special = {name: numbers.get(name, value) for name, value in zip(_names(placed), placed.values, strict=True)}
         start = start.without(placed) + type(placed)(**special, at=placed.at)
         cases.append(replace(c, starts=(start,), own=own))
     return cases
 
 
-def names(law: AbstractTerm) -> list[str]:
+def _names(law: AbstractTerm) -> list[str]:
     return [p.name for p in law.parameters]
 
 

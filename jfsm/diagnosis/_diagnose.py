@@ -182,20 +182,21 @@ def _searched(
     def told(trials: Sequence[Trial]) -> list[Trial]:
         return [t for t in (given, refitted, *trials) if not stands_for_the_drive(t)]
 
+    def close(trials: Sequence[Trial]) -> list[Trial]:
+        best = max(told(trials), key=lambda t: t.evidence)
+        return [t for t in trials if t is best or explained(t, refitted) >= GATE]
+
     tried, left_out = promising(every)
     found = search(tried, model, given, refitted, records, until, tell)
     if settled(told(found.trials), refitted):
-        best = max(told(found.trials), key=lambda t: t.evidence)
-        close = [t for t in found.trials if t is best or explained(t, refitted) >= GATE]
-        more = contained([law for t in close for law in t.laws], left_out)
+        more = contained([law for t in close(found.trials) for law in t.laws], left_out)
     else:  # of a missing force that is ill seen regression may put the right law last
         more = [c for c in left_out if c.starts]
     if more:
         then = search(more, model, given, refitted, records, until, tell)
         found = Found(found.trials + then.trials, found.behind + then.behind)
         left_out = [c for c in left_out if c not in more]
-    best = max(told(found.trials), key=lambda t: t.evidence)
-    found = search_special_cases(best, every, found, model, records, until, tell)
+    found = search_special_cases(close(found.trials), every, found, model, records, until, tell)
     trials, behind = [t.beside(refitted) for t in found.trials], found.behind
     louder = noise_beyond([given, refitted, *trials], records, until)
     trials = [t.amid(louder) for t in (given, refitted, *trials)]

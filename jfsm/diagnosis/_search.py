@@ -176,7 +176,7 @@ def search(
 
 
 def search_special_cases(
-    best: Trial,
+    laws: Sequence[Trial],
     every: Sequence[Candidate],
     known: Found,
     model: Structure,
@@ -184,11 +184,12 @@ def search_special_cases(
     until: Sequence[int],
     tell: Callable[[str, int], None],
 ) -> Found:
-    """The special cases of the best law fitted from its numbers as well: elsewhere they may have stopped on the way."""
-    tried = [c for law in best.laws for c in special_cases(best.structure, law, every, model)]
+    """The special cases of some laws fitted from their numbers as well: elsewhere they may have stopped on the way."""
+    tried = [c for t in laws for law in t.laws for c in special_cases(t.structure, law, every, model)]
     if not tried:
         return known
     lots = [_Lot(beginnings, model, records, until, _FROM_THERE.ladder) for beginnings in groups(tried, None)]
+    best = min(known.trials, key=lambda t: t.value)
     trials = _best_of_each([*known.trials, *_climbed(lots, _FROM_THERE, lots, best, tell).trials])
     done = {t.effects for t in trials}
     return Found(trials, [one for one in known.behind if one.effects not in done])
@@ -267,6 +268,7 @@ def _best_of_each(trials: Sequence[Trial]) -> list[Trial]:
     """The most probable start of every cause at every place."""
     best: dict[tuple, Trial] = {}
     for t in trials:
-        if t.effects not in best or t.evidence > best[t.effects].evidence:
-            best[t.effects] = t
+        other = best.get(t.effects, t)
+        better = t if t.evidence > other.evidence else other
+        best[t.effects] = replace(better, rung=min(t.rung, other.rung))
     return list(best.values())

@@ -122,9 +122,9 @@ def latent_force(
 
     _, model, swell = even = most_likely(np.ones(padded))
     mean, _ = (np.asarray(out) for out in _smooth(model, *data, jnp.asarray(swell)))
-    energy = np.mean(mean[:, :dof] ** 2 + (mean[:, dof : 2 * dof] / omega) ** 2, 1)
-    energy = gaussian_filter1d(np.where(np.arange(padded) < n, energy, 0.0), period, mode="nearest")
-    swelling = [most_likely(_scaled(energy**power, n)) for power in _SWELL]
+    energy = np.mean(mean[:n, :dof] ** 2 + (mean[:n, dof : 2 * dof] / omega) ** 2, 1)
+    energy = np.pad(gaussian_filter1d(energy, period, mode="nearest"), (0, padded - n))
+    swelling = [most_likely(_scaled(energy**power, n)) for power in _SWELL if np.any(energy > 0)]
     _, model, swell = max(even, *swelling, key=lambda found: found[0])
     mean, std = (np.asarray(out) for out in _smooth(model, *data, jnp.asarray(swell)))
     x, v, r = mean[:, :dof], mean[:, dof : 2 * dof], mean[:, 2 * dof :]
