@@ -195,6 +195,17 @@ def test_what_the_motion_leaves_untold_is_no_finding(why_not: str, verdict: str)
     assert decision.verdict == verdict and decision.why[id(found)] == why_not
 
 
+@pytest.mark.parametrize(("theta", "verdict"), [(1.0, "cause"), (2.0, "parameters")])
+def test_a_fault_of_a_sensor_that_is_as_large_as_it_may_be_is_no_finding(theta: float, verdict: str):
+    found = trial(1040.0, 0.0, "force_gain")
+    found.unknowns = (Unknown("force_gain@force-1.eps", 0.0, 1.0, True, 0.0, 1.0, low=-5.0, high=2.0),)
+    found.theta = np.array([theta])
+    refitted = trial(1000.0, 0.0)
+    decision = decide(GIVEN, refitted, [found], lambda t: None, lambda t: Unfit(0.0), periods=100.0)
+    assert decision.verdict == verdict
+    assert ("as far from" in decision.why[id(found)]) == (verdict == "parameters")
+
+
 @pytest.mark.parametrize(("power", "verdict"), [(0.0, "cause"), (0.004, "undecided")])
 def test_a_load_that_may_stand_for_the_drive_yields_to_whatever_leaves_nothing(power: float, verdict: str):
     load, drift = trial(9040.0, 0.0, "periodic_disturbance"), trial(9000.0, power, "damping_drift")

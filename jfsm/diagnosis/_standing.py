@@ -8,7 +8,7 @@ import numpy as np
 from ..structures import Preload
 from ._adequacy import GATE, SIGNIFICANT, adequate, explained
 from ._enough import WORTH_A_SECOND, strain
-from ._trial import Trial, own_values
+from ._trial import Trial, ended, own_values
 
 _SECOND = 15.0
 """Nats by which two effects must beat either of them alone."""
@@ -36,9 +36,10 @@ def special_case(winner: Trial, passing: Sequence[Trial]) -> Trial | None:
 def _far_off(trial: Trial) -> set[str]:
     """Own values of a trial that went as far as they may: it is another structure's force that they make up for.
 
-    Damping may go: a model without friction often states as viscous what friction takes.
+    So it is with a sensor's fault. Damping may go: a model without friction often states as viscous what that takes.
     """
-    own = own_values(trial)
+    faults = {effect.cause.effect.kind for effect in trial.effects if effect.cause.is_sensor}
+    own = [*own_values(trial), *((u, theta) for u, theta in ended(trial) if u.path.split("@")[0] in faults)]
     low = {u.path for u, theta in own if theta < u.low + _NEAR and not u.path.startswith("damping@")}
     return low | {u.path for u, theta in own if theta > u.high - _NEAR}
 
