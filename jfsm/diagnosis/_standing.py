@@ -36,7 +36,8 @@ def special_case(winner: Trial, passing: Sequence[Trial]) -> Trial | None:
 def _far_off(trial: Trial) -> set[str]:
     """Own values of a trial that went as far as they may: it is another structure's force that they make up for.
 
-    So it is with a sensor's fault. Damping may go: a model without friction often states as viscous what that takes.
+    So it is with a sensor's fault. Damping may go: a model without friction often states as viscous what friction
+    takes.
     """
     faults = {effect.cause.effect.kind for effect in trial.effects if effect.cause.is_sensor}
     own = [*own_values(trial), *((u, theta) for u, theta in ended(trial) if u.path.split("@")[0] in faults)]
