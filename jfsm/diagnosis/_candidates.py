@@ -151,8 +151,7 @@ def contained(laws: Sequence[AbstractTerm], among: Sequence[Candidate]) -> list[
 
 def special_cases(found: Structure, law: AbstractTerm, among: Sequence[Candidate], model: Structure) -> list[Candidate]:
     """What a law that was found is for certain of its numbers, beginning from the numbers and own values found."""
-    values = found.values()
-    own, numbers = {path: values[path] for path in model.entries()}, dict(zip(_names(law), law.values, strict=True))
+    own, numbers = values_found(model, found), dict(zip(_names(law), law.values, strict=True))
     cases = []
     for c in contained([law], among):
         start = c.starts[0]
@@ -161,6 +160,12 @@ def special_cases(found: Structure, law: AbstractTerm, among: Sequence[Candidate
         start = start.without(placed) + type(placed)(**special, at=placed.at)
         cases.append(replace(c, starts=(start,), own=own))
     return cases
+
+
+def values_found(model: Structure, found: Structure) -> dict[str, float]:
+    """The model's own values as a structure that extends it has them."""
+    values = found.values()
+    return {path: values[path] for path in model.entries()}
 
 
 def _names(law: AbstractTerm) -> list[str]:

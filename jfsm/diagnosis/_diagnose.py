@@ -180,15 +180,15 @@ def _searched(
     stands_for_the_drive = in_step(records)
 
     def told(trials: Sequence[Trial]) -> list[Trial]:
-        return [t for t in (given, refitted, *trials) if not stands_for_the_drive(t)]
+        return [t for t in trials if not stands_for_the_drive(t)]
 
     def close(trials: Sequence[Trial]) -> list[Trial]:
-        best = max(told(trials), key=lambda t: t.evidence)
+        best = max(told([given, refitted, *trials]), key=lambda t: t.evidence)
         return [t for t in trials if t is best or explained(t, refitted) >= GATE]
 
     tried, left_out = promising(every)
     found = search(tried, model, given, refitted, records, until, tell)
-    if settled(told(found.trials), refitted):
+    if settled(told([given, refitted, *found.trials]), refitted):
         more = contained([law for t in close(found.trials) for law in t.laws], left_out)
     else:  # of a missing force that is ill seen regression may put the right law last
         more = [c for c in left_out if c.starts]
@@ -203,7 +203,7 @@ def _searched(
     given, refitted, *trials = beside_chance(trials, model, records, until, key)
     lack = LackOfFit(records, until)
     imposed = records[0].path is not None
-    effects = _beside(told(trials), refitted, every, lack, imposed=imposed) if pairs else []
+    effects = _beside(told([given, refitted, *trials]), refitted, every, lack, imposed=imposed) if pairs else []
     if effects:
         found = search_pairs(effects, trials, model, refitted, records, until, tell)
         trials = [given, refitted, *trials, *(t.beside(refitted).amid(louder) for t in found.trials)]

@@ -22,7 +22,7 @@ from ..identification import LADDER, Nuisances, Posterior, approach, finish, lan
 from ..records import Record
 from ..structures import AbstractTerm, Structure
 from ._adequacy import SIGNIFICANT
-from ._candidates import hypothesis
+from ._candidates import hypothesis, values_found
 from ._chance import noise_levels
 from ._gain import remeasured
 from ._trial import Trial
@@ -192,10 +192,9 @@ def _evidence(model: Structure, nuisances: Nuisances, rival: Trial) -> float:
     start = model
     for part in rival.parts:
         start = start + part
-    values = rival.structure.values()
     lanes = lanes_of(start)
     records = [nuisances.resolving([start])]
-    own = {path: values[path] for path in model.entries()}
+    own = values_found(model, rival.structure)
     posterior = Posterior(
         hypothesis(model, [start] * lanes, records, begins=[own] * lanes), records, [nuisances.samples]
     )

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from ..identification import Nuisances
 from ..structures import AbstractSensor, AbstractTerm, CubicStiffness, QuadraticStiffness, Structure
-from ._candidates import SHAPES, Candidate, Laws, natural_starts
+from ._candidates import SHAPES, Candidate, Laws, natural_starts, values_found
 from ._effect import Effect
 from ._trial import Trial
 
@@ -72,8 +72,7 @@ def _beside(
     """Pairs of one effect of a trial, which `structure` has, with every other."""
     effect, part = base.effects[kept], base.parts[kept]
     laws, others = Laws(structure, nuisances), [part] if isinstance(part, AbstractTerm) else []
-    values = structure.values()
-    own = {path: values[path] for path in model.entries()}
+    own = values_found(model, structure)
     found = []
     for other in effects:
         if not _are_two(effect, other):

@@ -11,7 +11,7 @@ from .._threads import compiled_once, side_by_side
 from ..identification import LADDER, LANES, Maximum, Nuisances, Posterior, approach, finish, lanes_of, rungs
 from ..structures import Structure
 from ._adequacy import GATE, explained
-from ._candidates import Candidate, hypothesis, special_cases
+from ._candidates import Candidate, hypothesis, special_cases, values_found
 from ._effect import Effect
 from ._pairs import instead, pairs
 from ._trial import Trial, trial
@@ -114,7 +114,7 @@ def fit_model(
     One comes down the ladder, for values that are far off; one begins at the values as given, for a model that lacks
     something, whose top rungs lead astray. Of values refitted before, `near` tells them.
     """
-    own = None if near is None else {path: near.values()[path] for path in model.entries()}
+    own = None if near is None else values_found(model, near)
     both = min(2, lanes_of(model))
     ladder = LADDER if near is None else LADDER[-1:]
 
@@ -167,8 +167,7 @@ def search(
     tell: Callable[[str, int], None],
 ) -> Found:
     """Every candidate fitted, those far behind only so far."""
-    values = refitted.structure.values()
-    own = {p: values[p] for p in model.entries()} if refitted.evidence > given.evidence else None
+    own = values_found(model, refitted.structure) if refitted.evidence > given.evidence else None
     lots = [_Lot(beginnings, model, records, until, _ALONE.ladder) for beginnings in groups(tried, own)]
     most = sorted((candidate.share or 0.0 for candidate in tried), reverse=True)[:_PROMISING]
     kept = [lot for lot in lots if lot.share > 0 and lot.share >= most[-1]]
@@ -190,7 +189,7 @@ def search_special_cases(
         return known
     lots = [_Lot(beginnings, model, records, until, _FROM_THERE.ladder) for beginnings in groups(tried, None)]
     best = min(known.trials, key=lambda t: t.value)
-    trials = _best_of_each([*known.trials, *_climbed(lots, _FROM_THERE, lots, best, tell).trials])
+    trials = _best_of_each([*known.trials, *_climbed(lots, _FROM_THERE, [], best, tell).trials])
     done = {t.effects for t in trials}
     return Found(trials, [one for one in known.behind if one.effects not in done])
 

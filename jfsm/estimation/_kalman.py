@@ -8,7 +8,15 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
+
+_LEAST_SWELL = 1e-4
+
+
+def swell_of(power: np.ndarray) -> np.ndarray:
+    """How random forces of this power swell and fade, in the mean by 1."""
+    return np.maximum(power / np.mean(power), _LEAST_SWELL)
 
 
 class LinearModel(eqx.Module):

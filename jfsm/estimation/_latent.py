@@ -22,7 +22,7 @@ from ..dynamics._along import force_along
 from ..dynamics._excitation import bucket
 from ..dynamics._grid import Fine, punctual, shifted
 from ..dynamics._plant import Plant, Readout
-from ._kalman import LinearModel, log_likelihood, smoothed
+from ._kalman import LinearModel, log_likelihood, smoothed, swell_of
 
 _MEMORIES = (0.15, 1.0)
 """τ of the latent force, in radians of the motion."""
@@ -30,8 +30,6 @@ _AMPLITUDES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 """Its amplitude, as a share of the elastic force."""
 _SWELL = (1, 2)
 """Powers of the motion's energy that the latent force's power may follow: of linear laws and of steeper ones."""
-_LEAST_SWELL = 1e-4
-"""Power of the latent force where nothing moves, as a share of its mean."""
 _WIDE = 10.0
 _CERTAIN = 5.0
 """Velocity, in its standard errors, from which something moves."""
@@ -123,8 +121,12 @@ def latent_force(
     _, model, swell = even = most_likely(np.ones(padded))
     mean, _ = (np.asarray(out) for out in _smooth(model, *data, jnp.asarray(swell)))
     energy = np.mean(mean[:n, :dof] ** 2 + (mean[:n, dof : 2 * dof] / omega) ** 2, 1)
-    energy = np.pad(gaussian_filter1d(energy, period, mode="nearest"), (0, padded - n))
-    swelling = [most_likely(_scaled(energy**power, n)) for power in _SWELL if np.any(energy > 0)]
+    energy = gaussian_filter1d(energy, period, mode="nearest")
+    swelling = [
+        most_likely(np.pad(swell_of(energy**power), (0, padded - n), mode="edge"))
+        for power in _SWELL
+        if np.any(energy > 0)
+    ]
     _, model, swell = max(even, *swelling, key=lambda found: found[0])
     mean, std = (np.asarray(out) for out in _smooth(model, *data, jnp.asarray(swell)))
     x, v, r = mean[:, :dof], mean[:, dof : 2 * dof], mean[:, 2 * dof :]
@@ -132,11 +134,6 @@ def latent_force(
     x, v, r, known, std = (q[:n] for q in (x, v, r, known, std))
     moves = maximum_filter1d(np.abs(v), period, axis=0) > _CERTAIN * std[:, dof : 2 * dof]
     return Latent(x, v, r - known, std[:, 2 * dof :], np.any(moves, 1))
-
-
-def _scaled(power: np.ndarray, n: int) -> np.ndarray:
-    """A power as a share of its mean over the first n samples."""
-    return np.maximum(power / np.mean(power[:n]), _LEAST_SWELL)
 
 
 def _on_time(plant: Plant, seen: np.ndarray, use: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:

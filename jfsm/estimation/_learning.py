@@ -7,6 +7,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import minimize
 
+from ._kalman import swell_of
 from ._part import STEADY, Part
 from ._resonator import Kind, Numbers, cost, motion
 
@@ -16,7 +17,6 @@ _SMOOTHNESS = (0, 2)
 """Derivatives that the random forces may have."""
 _CYCLES = (1.0, 4.0)
 """Cycles of the motion over which the random forces may swell or fade."""
-_LEAST_SWELL = 1e-4
 _DRIFT = 8.0
 """Nats by which a bias that wanders must be more probable than a constant."""
 _SEARCH = {"maxiter": 80, "ftol": 1e-8}
@@ -131,7 +131,7 @@ def _swollen(part: Part, found: Learned) -> Learned:
     for cycles in _CYCLES:
         window = cycles * 2 * np.pi / (part.omega * part.dt)
         local = gaussian_filter1d(power, window, mode="nearest")
-        swell = np.maximum(local / np.mean(local), _LEAST_SWELL)
+        swell = swell_of(local)
         # What is free to swell fits better by chance: half a nat for every window.
         better = _climbed(part, found.kind, found.theta, swell, found.price + 0.5 * min(n, _LEARNED) / window)
         best = min(best, better, key=lambda each: each.cost)
