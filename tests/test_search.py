@@ -1,12 +1,15 @@
 """The fits behind a diagnosis: how hypotheses are followed to their tops."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 
 import jfsm
 from jfsm.diagnosis._candidates import Candidate, candidates, chosen_causes, special_cases
 from jfsm.diagnosis._effect import Effect
-from jfsm.diagnosis._search import Found, LeftBehind, fit_model, search, search_special_cases
+from jfsm.diagnosis._search import Found, LeftBehind, fit_model, refit_from, search, search_special_cases
 from jfsm.identification import prepare
 from jfsm.structures import Coulomb, Stribeck, causes
 
@@ -23,7 +26,9 @@ def test_a_special_case_begins_from_the_numbers_of_the_law_that_holds_it():
     assert case.own == MODEL.values() | {"stiffness@0-1.k": 8.0}
 
 
-def test_a_special_case_that_stopped_on_its_way_is_fitted_from_the_law_that_holds_it():
+@pytest.fixture(scope="module")
+def with_friction():
+    """A record of dry friction that the model lacks, with how much of it is fitted."""
     time = np.arange(600) * 0.06
 
     def force(t):
@@ -35,19 +40,39 @@ def test_a_special_case_that_stopped_on_its_way_is_fitted_from_the_law_that_hold
     x = solve_ivp(rate, (0, time[-1]), [0.0, 0.0], t_eval=time, method="LSODA", rtol=1e-8, atol=1e-10).y[0]
     noise = 0.01 * np.random.default_rng(1).standard_normal((2, time.size))
     record = jfsm.Record(time, force(time) + 4 * noise[0], x + np.std(x) * noise[1], at_rest=True)
-    records, until = [prepare(record, MODEL)], [time.size]
-    given, refitted = fit_model(MODEL, records, until)
-    every = candidates(MODEL, records, chosen_causes(["stribeck", "coulomb"]))
+    return [prepare(record, MODEL)], [time.size]
+
+
+@pytest.fixture(scope="module")
+def fitted(with_friction):
+    """The model as given and refitted."""
+    return fit_model(MODEL, *with_friction)
+
+
+def tell(what, steps):
+    pass
+
+
+def test_a_special_case_that_stopped_on_its_way_is_fitted_from_the_law_that_holds_it(with_friction, fitted):
+    every = candidates(MODEL, with_friction[0], chosen_causes(["stribeck", "coulomb"]))
     stribeck, coulomb = (next(c for c in every if c.effects[0].cause.id == name) for name in ("stribeck", "coulomb"))
-
-    def tell(what, steps):
-        pass
-
-    alone = search([stribeck], MODEL, given, refitted, records, until, tell)
+    alone = search([stribeck], MODEL, *fitted, *with_friction, tell)
     stopped = Found(alone.trials, [LeftBehind(coulomb.effects, 613.0)])
-    found = search_special_cases(alone.trials, every, stopped, MODEL, records, until, tell)
+    found = search_special_cases(alone.trials, every, stopped, MODEL, *with_friction, tell)
     evidence = {t.effects[0].cause.id: t.evidence for t in found.trials}
     assert found.behind == []
     assert 0.0 < evidence["coulomb"] - evidence["stribeck"] < 10.0
     (value,) = (t.structure.values()["coulomb@0-1.F"] for t in found.trials if t.effects == coulomb.effects)
     assert abs(value - 0.8) < 0.05
+
+
+def test_a_refit_that_stopped_on_its_way_is_climbed_again_from_own_values_found_beside_an_effect(with_friction, fitted):
+    _, refitted = fitted
+    beside = replace(refitted, structure=refitted.structure.with_values({"stiffness@0-1.k": 8.9}))
+    stopped = replace(refitted, evidence=refitted.evidence - 17.0)
+    again = refit_from([beside], stopped, MODEL, *with_friction)
+    assert again.label == "refitted" and again.effects == ()
+    assert abs(again.evidence - refitted.evidence) < 0.1
+    better = replace(refitted, evidence=refitted.evidence + 17.0)
+    assert refit_from([beside], better, MODEL, *with_friction) is better
+    assert refit_from([], stopped, MODEL, *with_friction) is stopped

@@ -29,7 +29,7 @@ from ._lack_of_fit import LackOfFit
 from ._next import Leading
 from ._report import Tested, assemble
 from ._residual import residual, stand_in
-from ._search import Found, LeftBehind, fit_model, search, search_pairs, search_special_cases
+from ._search import Found, LeftBehind, fit_model, refit_from, search, search_pairs, search_special_cases
 from ._trial import Trial
 from ._untold import in_step, untold
 
@@ -197,6 +197,7 @@ def _searched(
         found = Found(found.trials + then.trials, found.behind + then.behind)
         left_out = [c for c in left_out if c not in more]
     found = search_special_cases(close(found.trials), every, found, model, records, until, tell)
+    refitted = refit_from(found.trials, refitted, model, records, until)
     trials, behind = [t.beside(refitted) for t in found.trials], found.behind
     louder = noise_beyond([given, refitted, *trials], records, until)
     trials = [t.amid(louder) for t in (given, refitted, *trials)]

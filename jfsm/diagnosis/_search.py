@@ -136,6 +136,21 @@ def fit_model(
     return given, refitted
 
 
+def refit_from(
+    laws: Sequence[Trial], refitted: Trial, model: Structure, records: Sequence[Nuisances], until: Sequence[int]
+) -> Trial:
+    """The model refitted, the better of two climbs: its own may have stopped below where one from own values leads that
+    were found beside an effect."""
+    begins = [values_found(model, t.structure) for t in sorted(laws, key=lambda t: t.value)[: lanes_of(model)]]
+    if not begins:
+        return refitted
+    posterior = Posterior(hypothesis(model, [model] * len(begins), records, begins=begins), records, until)
+    rung = approach(posterior, LADDER[-1:])
+    found = finish(posterior, rung)
+    again = trial(posterior, found, int(np.argmin(found.value)), float(np.min(rung.value)), refitted.label)
+    return again if again.evidence > refitted.evidence else refitted
+
+
 def groups(tried: Sequence[Candidate], own: Mapping[str, float] | None) -> list[list[Beginning]]:
     """Starts that can share a program, in lots of its lanes: one law, whatever its sign and place.
 
