@@ -307,6 +307,34 @@ def test_an_unlikely_cause_that_leaves_something_must_be_confirmed_by_held_out_r
     assert bool(_speaks_against(gain, decision)) != named
 
 
+@pytest.mark.parametrize(
+    ("gained", "whiteness", "left", "verdict"),
+    [
+        (394.0, 0.02, 0.0, "cause"),
+        (10.0, 0.02, 0.0, "consistent"),
+        (394.0, 0.2, 0.0, "consistent"),
+        (394.0, 0.02, 5e-3, "undecided"),
+    ],
+)
+def test_where_predictions_leave_nothing_evidence_alone_may_name_what_leaves_but_noise(
+    gained: float, whiteness: float, left: float, verdict: str
+):
+    given, refitted, found = trial(-50.0, left), trial(0.0, left), trial(gained, 0.0, "preload")
+    refitted.whiteness, found.whiteness = 0.12, whiteness
+    found.prediction = refitted.prediction
+    decision = decide(given, refitted, [found], lambda t: None, lambda t: Unfit(0.0), periods=100.0)
+    assert decision.verdict == verdict
+
+
+@pytest.mark.parametrize(("kappa", "low", "named"), [(0.0, 0.3, True), (0.0, -0.3, False), (0.6, -0.3, True)])
+def test_what_no_prediction_shows_is_named_if_the_held_out_run_confirms_it(kappa: float, low: float, named: bool):
+    winner = trial(9000.0, 0.0, "preload")
+    winner.laws = (jfsm.Preload(1.0, at=(0, 1)),)
+    gain = Gain(before=0.2, refitted=0.05, after=0.05, floor=0.05, channels={}, interval=(low, 1.0))
+    decision = Decision("cause", winner, {id(winner): 1.0}, {id(winner): kappa}, {})
+    assert bool(_speaks_against(gain, decision)) != named
+
+
 @pytest.mark.parametrize(("behind", "verdict"), [(4.0, "parameters"), (0.5, "undecided")])
 def test_own_values_are_not_the_cause_where_something_else_is_as_likely(behind: float, verdict: str):
     refitted = trial(10_000.0, 0.0)

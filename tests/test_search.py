@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jfsm
-from jfsm.diagnosis._candidates import Candidate, candidates, chosen_causes, special_cases
+from jfsm.diagnosis._candidates import Candidate, candidates, chosen_causes, late_instead, special_cases
 from jfsm.diagnosis._effect import Effect
-from jfsm.diagnosis._search import Found, LeftBehind, fit_model, refit_from, search, search_special_cases
+from jfsm.diagnosis._search import Found, LeftBehind, fit_model, refit_from, search, search_akin
 from jfsm.identification import prepare
 from jfsm.structures import Coulomb, Stribeck, causes
 
@@ -24,6 +24,24 @@ def test_a_special_case_begins_from_the_numbers_of_the_law_that_holds_it():
     assert case.effects == coulomb.effects
     assert case.starts[0].values() == MODEL.values() | {"coulomb@0-1.F": 2.0}
     assert case.own == MODEL.values() | {"stiffness@0-1.k": 8.0}
+
+
+def test_an_early_channel_is_a_late_other_one():
+    known = causes()
+
+    def delay(kind, at) -> Candidate:
+        return Candidate((Effect(known[kind], at),), (MODEL,))
+
+    force, channel = delay("force_delay", ("force", 1)), delay("channel_delay", ("displacement", 1))
+    early = jfsm.ForceDelay(-0.04, at=("force", 1))
+    found = MODEL.with_values({"stiffness@0-1.k": 8.0}) + early
+    (late,) = late_instead(found, early, [force, channel], MODEL)
+    assert late.effects == channel.effects
+    assert late.starts[0].values() == MODEL.values() | {"channel_delay@displacement-1.tau": 0.04}
+    assert late.own == MODEL.values() | {"stiffness@0-1.k": 8.0}
+    assert late_instead(found, jfsm.ForceDelay(0.04, at=("force", 1)), [force, channel], MODEL) == []
+    other = delay("channel_delay", ("acceleration", 1))
+    assert late_instead(found, early, [force, channel, other], MODEL) == []
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +76,7 @@ def test_a_special_case_that_stopped_on_its_way_is_fitted_from_the_law_that_hold
     stribeck, coulomb = (next(c for c in every if c.effects[0].cause.id == name) for name in ("stribeck", "coulomb"))
     alone = search([stribeck], MODEL, *fitted, *with_friction, tell)
     stopped = Found(alone.trials, [LeftBehind(coulomb.effects, 613.0)])
-    found = search_special_cases(alone.trials, every, stopped, MODEL, *with_friction, tell)
+    found = search_akin(alone.trials, every, stopped, MODEL, *with_friction, tell)
     evidence = {t.effects[0].cause.id: t.evidence for t in found.trials}
     assert found.behind == []
     assert 0.0 < evidence["coulomb"] - evidence["stribeck"] < 10.0

@@ -93,3 +93,18 @@ def test_a_late_displacement_alone_is_told_no_better_than_an_early_force():
     early = jfsm.fit(MODEL + jfsm.ForceDelay(-0.1, at=("force", 1)), record)
     assert late.values["channel_delay@displacement-1.tau"] == pytest.approx(tau, rel=0.01)
     assert late.log_likelihood == pytest.approx(early.log_likelihood, abs=3.0)
+
+
+@pytest.mark.parametrize("tau", [0.33, -0.33])
+@pytest.mark.parametrize("kind", ["displacement", "velocity", "acceleration"])
+def test_a_free_run_begins_where_a_late_channel_says_the_motion_was(kind, tau):
+    fine = np.linspace(-1.0, T[-1] + 1.0, 20 * (T.size - 1 + 40) + 1)
+    motion = jfsm.simulate(MODEL, jfsm.Record(fine, force(fine)), initial_state=(0.1, 0.0))
+    shown = {kind: np.interp(T - tau, fine, getattr(motion, kind)[:, 0])}
+    record = jfsm.Record(T, force(T), **shown)  # pyright: ignore[reportArgumentType]
+    response = jfsm.simulate(MODEL + jfsm.ChannelDelay(tau, at=(kind, 1)), record, window=60)
+    inside = slice(10, -10)
+    error = response.readings(record)[kind, 1] - shown[kind]
+    assert np.max(np.abs(error)[inside]) < 3e-3 * np.std(shown[kind])
+    exact = np.interp(T, fine, motion.displacement[:, 0])
+    assert np.max(np.abs(response.displacement[:, 0] - exact)) < 3e-3 * np.std(exact)

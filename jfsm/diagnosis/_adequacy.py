@@ -32,10 +32,14 @@ def white(trial: Trial) -> bool:
     return trial.whiteness < _WHITE and bool(np.all(np.abs(trial.noise[trial.trusted]) < _SCALE))
 
 
+def unexplained(baseline: Trial) -> np.ndarray:
+    """Sets of which a baseline's predictions leave anything to explain."""
+    return baseline.prediction.excess > np.maximum(NOTICEABLE * baseline.prediction.expected, 1e-9)
+
+
 def explained(trial: Trial, baseline: Trial) -> float:
     """Smallest share of the baseline's excess power that a trial explains, over the sets where there is any."""
-    start, left = baseline.prediction.excess, trial.prediction.excess
-    significant = start > np.maximum(NOTICEABLE * baseline.prediction.expected, 1e-9)
+    start, left, significant = baseline.prediction.excess, trial.prediction.excess, unexplained(baseline)
     if not np.any(significant):
         return 0.0
     return float(np.min(1.0 - left[significant] / start[significant])) if np.all(np.isfinite(left)) else -math.inf

@@ -27,6 +27,7 @@ from ..identification import (
     with_offsets,
 )
 from ..structures import (
+    AbstractSensor,
     AbstractTerm,
     AccelerationBias,
     AccelerationGain,
@@ -34,6 +35,7 @@ from ..structures import (
     ChannelDelay,
     Clipping,
     CoulombAsymmetric,
+    ForceDelay,
     ForceGain,
     PeriodicDisturbance,
     Preload,
@@ -160,6 +162,21 @@ def special_cases(found: Structure, law: AbstractTerm, among: Sequence[Candidate
         start = start.without(placed) + type(placed)(**special, at=placed.at)
         cases.append(replace(c, starts=(start,), own=own))
     return cases
+
+
+def late_instead(
+    found: Structure, early: AbstractTerm | AbstractSensor, among: Sequence[Candidate], model: Structure
+) -> list[Candidate]:
+    """The delay of the other one of two channels, of which one was found to be early."""
+    if not isinstance(early, ForceDelay | ChannelDelay) or early.tau >= 0:
+        return []
+    delays = [c for c in among if len(c.effects) == 1 and c.effects[0].cause.effect in (ForceDelay, ChannelDelay)]
+    others = [c for c in delays if c.effects[0].at != early.at]
+    if len(delays) != 2 or len(others) != 1:  # of three one is late as none of the others is early
+        return []
+    [(cause, at)] = others[0].effects
+    late = model + cause.effect(-early.tau, at=at)
+    return [replace(others[0], starts=(late,), own=values_found(model, found))]
 
 
 def values_found(model: Structure, found: Structure) -> dict[str, float]:

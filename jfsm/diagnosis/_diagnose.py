@@ -29,7 +29,7 @@ from ._lack_of_fit import LackOfFit
 from ._next import Leading
 from ._report import Tested, assemble
 from ._residual import residual, stand_in
-from ._search import Found, LeftBehind, fit_model, refit_from, search, search_pairs, search_special_cases
+from ._search import Found, LeftBehind, fit_model, refit_from, search, search_akin, search_pairs
 from ._trial import Trial
 from ._untold import in_step, untold
 
@@ -196,7 +196,7 @@ def _searched(
         then = search(more, model, given, refitted, records, until, tell)
         found = Found(found.trials + then.trials, found.behind + then.behind)
         left_out = [c for c in left_out if c not in more]
-    found = search_special_cases(close(found.trials), every, found, model, records, until, tell)
+    found = search_akin(close(found.trials), every, found, model, records, until, tell)
     refitted = refit_from(found.trials, refitted, model, records, until)
     trials, behind = [t.beside(refitted) for t in found.trials], found.behind
     louder = noise_beyond([given, refitted, *trials], records, until)
@@ -257,6 +257,9 @@ def _speaks_against(gain: Gain, decision: Decision) -> str:
     unsure = decision.verdict == "cause" and decision.share(decision.winner) < 0.5 and not adequate(decision.winner)
     if unsure and not (gain.closable and gain.significant):
         return "is not likely, leaves something, and is not confirmed by held-out readings"
+    unpredicted = decision.verdict == "cause" and decision.winner.laws and decision.kappa[id(decision.winner)] == 0.0
+    if unpredicted and not (gain.closable and gain.significant):
+        return "explains nothing that predictions leave, and is not confirmed by held-out readings"
     if decision.verdict == "unnamed" and gain.closable and gain.closed < GATE:
         return "closes less than half of the error on held-out readings"
     return ""

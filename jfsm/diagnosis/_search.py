@@ -11,7 +11,7 @@ from .._threads import compiled_once, side_by_side
 from ..identification import LADDER, LANES, Maximum, Nuisances, Posterior, approach, finish, lanes_of, rungs
 from ..structures import Structure
 from ._adequacy import GATE, explained
-from ._candidates import Candidate, hypothesis, special_cases, values_found
+from ._candidates import Candidate, hypothesis, late_instead, special_cases, values_found
 from ._effect import Effect
 from ._pairs import instead, pairs
 from ._trial import Trial, trial
@@ -42,7 +42,7 @@ _TOGETHER = _Way((0.03, 0.01), 6, 0.25)
 
 
 _FROM_THERE = _Way(LADDER[-1:], 1, 1.0)
-"""Of special cases of a law, from its numbers."""
+"""From numbers of what is akin."""
 
 
 class LeftBehind(NamedTuple):
@@ -189,8 +189,8 @@ def search(
     return _climbed(lots, _ALONE, kept, refitted, tell)
 
 
-def search_special_cases(
-    laws: Sequence[Trial],
+def search_akin(
+    close: Sequence[Trial],
     every: Sequence[Candidate],
     known: Found,
     model: Structure,
@@ -198,8 +198,12 @@ def search_special_cases(
     until: Sequence[int],
     tell: Callable[[str, int], None],
 ) -> Found:
-    """The special cases of some laws fitted from their numbers as well: elsewhere they may have stopped on the way."""
-    tried = [c for t in laws for law in t.laws for c in special_cases(t.structure, law, every, model)]
+    """What comes close for certain of its numbers, or looks the same, fitted from these numbers as well.
+
+    So are special cases of a law, and the delay of another channel: from elsewhere they may have stopped on the way.
+    """
+    tried = [c for t in close for law in t.laws for c in special_cases(t.structure, law, every, model)]
+    tried += [c for t in close for part in t.parts for c in late_instead(t.structure, part, every, model)]
     if not tried:
         return known
     lots = [_Lot(beginnings, model, records, until, _FROM_THERE.ladder) for beginnings in groups(tried, None)]

@@ -6,12 +6,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..structures import Preload
-from ._adequacy import GATE, SIGNIFICANT, adequate, explained
+from ._adequacy import GATE, SIGNIFICANT, adequate, explained, unexplained
 from ._enough import WORTH_A_SECOND, strain
 from ._trial import Trial, ended, own_values
 
 _SECOND = 15.0
 """Nats by which two effects must beat either of them alone."""
+_UNPREDICTED = 15.0
+"""Nats by which a cause must beat a refit whose predictions leave nothing to explain."""
 _UNSEEN = 0.1
 """Nats by which a law must beat a special case of it for its further numbers to be seen."""
 _NEAR = 0.01
@@ -64,6 +66,9 @@ def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
     if better <= SIGNIFICANT:
         return f"no more probable than the model {'as given' if same else 'refitted'}"
     if over_refit >= GATE or (adequate(t) and over_given >= GATE):
+        return ""
+    # What shows over the whole record an unknown state may make up for over some periods, and these do not tell then.
+    if adequate(t) and not np.any(unexplained(refitted)) and better > _UNPREDICTED:
         return ""
     return f"explains {max(over_refit, 0.0):.0%} of what a refit leaves, less than half"
 

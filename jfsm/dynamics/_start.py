@@ -13,7 +13,7 @@ from ..records import Record
 from ..structures import Structure
 from ._drive import Reconstruction
 from ._excitation import bucket, excitation, substeps_for, typical_size
-from ._grid import free_run
+from ._grid import free_run, shifted
 from ._plant import Channel, Grid, lower, readout
 
 _ITERATIONS = 12
@@ -120,9 +120,13 @@ def _residuals(plant, show, fine, y, spread, counted, state):
         x, v, a = free_run(plant, fine, state[:dof], state[dof:])
         shown = {"displacement": x, "velocity": v, "acceleration": a + fine.base[:, :1]}
         seen = jnp.stack([shown[kind] @ row for kind, row in zip(show.kinds, show.select, strict=True)], 1)
+        told = jnp.broadcast_to(counted[:, None] > 0, seen.shape)
+        for tau, channel in zip(plant.channel_delay / fine.step, plant.late_channel, strict=True):
+            seen = seen.at[:, channel].set(shifted(seen[:, channel], -tau))
+            then = jnp.arange(counted.size) - tau  # what was before the record no state at its start tells
+            told = told.at[:, channel].set(told[:, channel] & (then >= 0) & (then <= jnp.sum(counted) - 1))
         shown_by_sensors = (1 + plant.channel_gain)[None, :] * seen + plant.channel_offset[None, :]
-        misfit = (shown_by_sensors - y) / spread[None, :]
-        return jnp.where(counted[:, None] > 0, misfit, 0.0).ravel()
+        return jnp.where(told, (shown_by_sensors - y) / spread[None, :], 0.0).ravel()
 
     jacobian = jax.vmap(partial(jax.jvp, residual, (state,)), out_axes=(None, 1))
     value, slope = jacobian((jnp.eye(2 * dof),))
