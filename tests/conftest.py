@@ -21,6 +21,7 @@ def pytest_configure(config: pytest.Config) -> None:
     if "JAX_COMPILATION_CACHE_DIR" not in os.environ and not hasattr(config, "workerinput"):
         store = tempfile.TemporaryDirectory(prefix="jfsm-programs-")
         os.environ["JAX_COMPILATION_CACHE_DIR"] = store.name
+        os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.2")
         config.add_cleanup(store.cleanup)
 
 
