@@ -308,19 +308,20 @@ def test_an_unlikely_cause_that_leaves_something_must_be_confirmed_by_held_out_r
 
 
 @pytest.mark.parametrize(
-    ("gained", "whiteness", "left", "verdict"),
+    ("gained", "refit", "whiteness", "left", "verdict"),
     [
-        (394.0, 0.02, 0.0, "cause"),
-        (10.0, 0.02, 0.0, "consistent"),
-        (394.0, 0.2, 0.0, "consistent"),
-        (394.0, 0.02, 5e-3, "undecided"),
+        (394.0, 0.12, 0.02, 0.0, "cause"),
+        (394.0, 0.05, 0.02, 0.0, "parameters"),
+        (10.0, 0.12, 0.02, 0.0, "consistent"),
+        (394.0, 0.12, 0.2, 0.0, "consistent"),
+        (394.0, 0.12, 0.02, 5e-3, "undecided"),
     ],
 )
-def test_where_predictions_leave_nothing_evidence_alone_may_name_what_leaves_but_noise(
-    gained: float, whiteness: float, left: float, verdict: str
+def test_where_predictions_leave_nothing_evidence_alone_may_name_what_alone_leaves_but_noise(
+    gained: float, refit: float, whiteness: float, left: float, verdict: str
 ):
     given, refitted, found = trial(-50.0, left), trial(0.0, left), trial(gained, 0.0, "preload")
-    refitted.whiteness, found.whiteness = 0.12, whiteness
+    refitted.whiteness, found.whiteness = refit, whiteness
     found.prediction = refitted.prediction
     decision = decide(given, refitted, [found], lambda t: None, lambda t: Unfit(0.0), periods=100.0)
     assert decision.verdict == verdict

@@ -13,7 +13,7 @@ from ._trial import Trial, ended, own_values
 _SECOND = 15.0
 """Nats by which two effects must beat either of them alone."""
 _UNPREDICTED = 15.0
-"""Nats by which a cause must beat a refit whose predictions leave nothing to explain."""
+"""Nats by which a cause must beat a refit whose predictions leave nothing to explain, though its innovations do."""
 _UNSEEN = 0.1
 """Nats by which a law must beat a special case of it for its further numbers to be seen."""
 _NEAR = 0.01
@@ -68,7 +68,8 @@ def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
     if over_refit >= GATE or (adequate(t) and over_given >= GATE):
         return ""
     # What shows over the whole record an unknown state may make up for over some periods, and these do not tell then.
-    if adequate(t) and not np.any(unexplained(refitted)) and better > _UNPREDICTED:
+    only_it_fits = adequate(t) and not adequate(refitted) and not np.any(unexplained(refitted))
+    if only_it_fits and better > _UNPREDICTED:
         return ""
     return f"explains {max(over_refit, 0.0):.0%} of what a refit leaves, less than half"
 
