@@ -74,9 +74,11 @@ def tell(what, steps):
 def test_a_special_case_that_stopped_on_its_way_is_fitted_from_the_law_that_holds_it(with_friction, fitted):
     every = candidates(MODEL, with_friction[0], chosen_causes(["stribeck", "coulomb"]))
     stribeck, coulomb = (next(c for c in every if c.effects[0].cause.id == name) for name in ("stribeck", "coulomb"))
-    alone = search([stribeck], MODEL, *fitted, *with_friction, tell)
+    given, refitted = fitted
+    records, until = with_friction
+    alone = search([stribeck], MODEL, given, refitted, records, until, tell)
     stopped = Found(alone.trials, [LeftBehind(coulomb.effects, 613.0)])
-    found = search_akin(alone.trials, every, stopped, MODEL, *with_friction, tell)
+    found = search_akin(alone.trials, every, stopped, MODEL, records, until, tell)
     evidence = {t.effects[0].cause.id: t.evidence for t in found.trials}
     assert found.behind == []
     assert 0.0 < evidence["coulomb"] - evidence["stribeck"] < 10.0
