@@ -171,12 +171,12 @@ def late_instead(
     if not isinstance(early, ForceDelay | ChannelDelay) or early.tau >= 0:
         return []
     delays = [c for c in among if len(c.effects) == 1 and c.effects[0].cause.effect in (ForceDelay, ChannelDelay)]
-    others = [c for c in delays if c.effects[0].at != early.at]
-    if len(delays) != 2 or len(others) != 1:  # of three one is late as none of the others is early
+    if len(delays) != 2:  # of three one is late as none of the others is early
         return []
-    [(cause, at)] = others[0].effects
+    other = next(c for c in delays if c.effects[0].at != early.at)
+    [(cause, at)] = other.effects
     late = model + cause.effect(-early.tau, at=at)
-    return [replace(others[0], starts=(late,), own=values_found(model, found))]
+    return [replace(other, starts=(late,), own=values_found(model, found))]
 
 
 def values_found(model: Structure, found: Structure) -> dict[str, float]:

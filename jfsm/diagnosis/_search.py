@@ -137,11 +137,11 @@ def fit_model(
 
 
 def refit_from(
-    laws: Sequence[Trial], refitted: Trial, model: Structure, records: Sequence[Nuisances], until: Sequence[int]
+    beside: Sequence[Trial], refitted: Trial, model: Structure, records: Sequence[Nuisances], until: Sequence[int]
 ) -> Trial:
     """The model refitted, the better of two climbs: its own may have stopped below where one from own values leads that
     were found beside an effect."""
-    begins = [values_found(model, t.structure) for t in sorted(laws, key=lambda t: t.value)[: lanes_of(model)]]
+    begins = [values_found(model, t.structure) for t in sorted(beside, key=lambda t: t.value)[: lanes_of(model)]]
     if not begins:
         return refitted
     posterior = Posterior(hypothesis(model, [model] * len(begins), records, begins=begins), records, until)
@@ -198,9 +198,9 @@ def search_akin(
     until: Sequence[int],
     tell: Callable[[str, int], None],
 ) -> Found:
-    """What comes close for certain of its numbers, or looks the same, fitted from these numbers as well.
+    """Special cases of laws that come close, and late channels instead of early ones, fitted from their numbers too.
 
-    So are special cases of a law, and the delay of another channel: from elsewhere they may have stopped on the way.
+    From elsewhere they may have stopped on the way.
     """
     tried = [c for t in close for law in t.laws for c in special_cases(t.structure, law, every, model)]
     tried += [c for t in close for part in t.parts for c in late_instead(t.structure, part, every, model)]
