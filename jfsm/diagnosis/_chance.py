@@ -76,7 +76,7 @@ def noise_levels(trial: Trial, nuisances: Nuisances, index: int = 0) -> dict[tup
         channel: float(floor) * math.exp(scales.get(f"noise@{c}", 0.0) / 2)
         for c, (channel, floor) in enumerate(zip(nuisances.channels, nuisances.floor, strict=True))
     }
-    return levels | {("force", j + 1): math.sqrt(float(v)) for j, v in enumerate(nuisances.force_variance)}
+    return levels | {("force", j + 1): float(floor) for j, floor in enumerate(nuisances.force_floor)}
 
 
 def _noisy(nuisances: Nuisances, run: np.ndarray, levels: dict[tuple, float], rng: np.random.Generator) -> Record:

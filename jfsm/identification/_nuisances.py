@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -23,7 +24,7 @@ from ..dynamics._plant import Channel, Readout, lower, readout
 from ..dynamics._simulate import check_pair
 from ..dynamics._start import starting_state
 from ..estimation._filter import ProcessNoise, Readings
-from ..records import NoiseFloor, Record, clipped, declipped, noise_floor, spikes
+from ..records import NoiseFloor, Record, clipped, declipped, noise_floor, spikes, tones
 from ..structures import Structure
 
 _LEAST_NOISE = 1e-4
@@ -58,8 +59,10 @@ class Nuisances:
         What is imposed: the force (and the base), or the motion.
     spread : (channels,) array
         Standard deviation of each channel's readings.
+    force_floor : (dof,) array
+        Standard deviation of the white noise of the force's samples.
     force_variance : (dof,) array
-        White noise of the force's samples.
+        White noise as strong as what smoothing leaves of that where the structure moves.
     floor : (channels,) array
         Standard deviation of each channel's white noise; a mere guess where `trusted` is false, because the channel's
         signal fills its band.
@@ -82,6 +85,7 @@ class Nuisances:
     fine: Fine | Imposed
     readings: Readings
     noise: ProcessNoise
+    force_floor: np.ndarray
     force_variance: np.ndarray
     spread: np.ndarray
     floor: np.ndarray
@@ -196,23 +200,24 @@ def prepare(
     values = np.column_stack([record.responses[c] for c in channels])
     spread = _spread(channels, values)
     use, floor, trusted, torn = _noise(channels, values, spread, record.dt)
-    force, force_variance, share, words = _force(record, model)
+    force, words = _force(record, model)
     omega = fastest_mode(lower(model)) or _rate(values[:, 0], record.dt)
     length, crest = _size(channels, values, spread, omega)
     mass = _mass(weighed or model)
     variance = floor**2
     for i, (kind, j) in enumerate(channels):
         if kind == "acceleration":  # an acceleration is predicted with the force's own noise, less what smoothing took
-            variance[i] += force_variance[j - 1] * share[j - 1] / mass[j - 1, j - 1] ** 2
+            variance[i] += force.by_sample[j - 1] / mass[j - 1, j - 1] ** 2
     x0, v0 = _start(record, model, reconstruction)
     return Nuisances(
         record=record,
         channels=channels,
         show=readout(channels, model.dof),
-        fine=_drive(record, model, reconstruction, force),
+        fine=_drive(record, model, reconstruction, force.samples),
         readings=_padded(values, use, variance),
-        noise=_disturbance(mass, force_variance, omega, length, record.dt),
-        force_variance=force_variance,
+        noise=_disturbance(mass, force.in_motion, omega, length, record.dt),
+        force_floor=force.floor,
+        force_variance=force.in_motion,
         spread=spread,
         floor=floor,
         trusted=trusted,
@@ -281,6 +286,7 @@ def _prepare_imposed(record: Record, model: Structure, reconstruction: Reconstru
         fine=path.imposed(imposed_substeps(model, record.dt, typical_size(record)), bucket(len(record))),
         readings=_padded(values, use, floor**2),
         noise=ProcessNoise(jnp.zeros((model.dof, model.dof))),
+        force_floor=none[:0],
         force_variance=none[:0],
         spread=spread,
         floor=floor,
@@ -396,15 +402,29 @@ def _period(model: Structure, omega: float) -> float:
     return _STOPPED / float(np.max(rates))
 
 
-def _force(record: Record, model: Structure) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
-    """Force samples to run with, variance of their noise, share of it left in them, and notes.
+class _Force(NamedTuple):
+    """Force samples (n, dof) to run with, and their noise, each (dof,).
 
-    Where the force is smooth on its own grid, its noise is smoothed away; where it fills the band, the spline's
-    residual is signal, and the noise is taken as a thousandth of the force.
+    `floor` is the standard deviation with which they were measured; `by_sample` the variance that smoothing leaves in a
+    sample, and `in_motion` that of white noise as strong as what it leaves where the structure moves.
+    """
+
+    samples: np.ndarray
+    floor: np.ndarray
+    by_sample: np.ndarray
+    in_motion: np.ndarray
+
+
+def _force(record: Record, model: Structure) -> tuple[_Force, list[str]]:
+    """Force samples to run with, and notes.
+
+    Where the force is smooth on its own grid, its noise is smoothed away. A spline leaves all of it in the band of the
+    force, a sum of tones next to nothing. Where the force fills its band, the spline's residual is signal, and the
+    noise is taken as a thousandth of the force.
     """
     restored, dof, notes = force_limits(model), model.dof, []
     force = measured_force(record, dof, restored)
-    variance, share = np.zeros(dof), np.ones(dof)
+    std, by_sample, in_motion = np.zeros((3, dof))
     for (kind, j), samples in record.channels.items():
         if kind != "force":
             continue
@@ -417,12 +437,16 @@ def _force(record: Record, model: Structure) -> tuple[np.ndarray, np.ndarray, np
                 f"force {j} looks clipped; its true peaks are not known, which shows as an unexplained effect."
             )
         floor = noise_floor(force[:, j - 1], record.dt)
-        if floor.spacing >= _OVERSAMPLED:
-            force[:, j - 1] = floor.smooth
-            variance[j - 1], share[j - 1] = floor.std**2, floor.effective_parameters / samples.size
-        else:
-            variance[j - 1] = (_BAND_LIMITED * float(np.std(samples))) ** 2
-    return force, variance, share, notes
+        if floor.spacing < _OVERSAMPLED:
+            std[j - 1] = _BAND_LIMITED * float(np.std(samples))
+            by_sample[j - 1] = in_motion[j - 1] = std[j - 1] ** 2
+            continue
+        few = tones(force[:, j - 1], floor)
+        force[:, j - 1] = floor.smooth if few is None else few.curve
+        parameters = floor.effective_parameters if few is None else few.parameters
+        std[j - 1], by_sample[j - 1] = floor.std, floor.std**2 * parameters / samples.size
+        in_motion[j - 1] = floor.std**2 if few is None else by_sample[j - 1]
+    return _Force(force, std, by_sample, in_motion), notes
 
 
 def _size(channels: tuple[Channel, ...], values: np.ndarray, spread: np.ndarray, omega: float) -> tuple[float, float]:

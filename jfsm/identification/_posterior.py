@@ -184,7 +184,7 @@ class Posterior:
     def _part(self, index: int, nuisances: Nuisances) -> tuple[Plant, Lanes, np.ndarray]:
         """Plants and parameter maps of all lanes on one record, and which unknowns act on it."""
         structures = [self.hypothesis.structures[i] for i in self._pick]
-        mine = np.array([k for k, u in enumerate(self.hypothesis.unknowns[0]) if u.record in (None, index)])
+        mine = np.array([k for k, u in enumerate(self.hypothesis.unknowns[0]) if u.record in (None, index)], int)
         width = next(w for w in _WIDTHS if w >= len(mine))
         grid = Grid(float(nuisances.record.dt), nuisances.fine.substeps)
         slots = {"smooth_slots": _slot_bucket(structures[0]), "grid": grid, "rolled": True}

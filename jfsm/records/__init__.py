@@ -10,3 +10,4 @@ from jfsm.records._noise_floor import noise_floor as noise_floor
 from jfsm.records._read import read as read
 from jfsm.records._record import Record as Record
 from jfsm.records._silence import silent_forces as silent_forces
+from jfsm.records._tones import tones as tones
