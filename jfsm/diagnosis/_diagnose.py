@@ -24,7 +24,7 @@ from ._effect import Effect
 from ._enough import hidden, settled, something_left
 from ._forgiving import forgiving
 from ._gain import Gain, measure_gain
-from ._holdout import split
+from ._holdout import HeldOut, split
 from ._lack_of_fit import LackOfFit
 from ._next import Leading
 from ._report import Tested, assemble
@@ -118,19 +118,8 @@ def diagnose(
         decision = beside_clipping(decision, clipped, found.refitted)
     first, refitted = records[0], found.refitted
 
-    def gained(extended: Structure) -> tuple[Gain | None, list[dict]]:
-        if not held:
-            return None, []
-        noise = noise_levels(decision.winner, first)
-        return measure_gain(stated, refitted.extended(), extended, held, noise, first.omega, first.reconstruction, key)
-
     steps.next("the gain on held-out readings")
-    extended = model if decision.verdict == "consistent" else decision.winner.extended()
-    gain, runs = gained(extended)
-    if gain is not None and (against := _speaks_against(gain, decision)):
-        decision = decision.refused(against, refitted)
-        extended = refitted.extended()
-        gain, runs = gained(extended)
+    decision, extended, gain, runs = _confirmed(decision, refitted, model, stated, held, first, key)
     steps.next("the missing force")
     term = decision.named_term
     # Shown beside a law is the force that it stands for, with the own values that go with it.
@@ -248,6 +237,35 @@ def _believed(
         records = prepare_all(whole, model, reconstruction, weighed=refitted.structure)
         given, refitted = fit_model(model, records, until, near=refitted.structure)
     return records, until, given, refitted
+
+
+def _confirmed(
+    decision: Decision,
+    refitted: Trial,
+    model: Structure,
+    stated: Structure,
+    held: Sequence[HeldOut],
+    first: Nuisances,
+    key: jax.Array,
+) -> tuple[Decision, Structure, Gain | None, list[dict]]:
+    """The decision as held-out readings leave it, the structure to go on with, its gain, and the runs behind that.
+
+    The gain is that over the model as it was `stated`.
+    """
+
+    def gained(extended: Structure) -> tuple[Gain | None, list[dict]]:
+        if not held:
+            return None, []
+        noise = noise_levels(decision.winner, first)
+        return measure_gain(stated, refitted.extended(), extended, held, noise, first.omega, first.reconstruction, key)
+
+    extended = model if decision.verdict == "consistent" else decision.winner.extended()
+    gain, runs = gained(extended)
+    if gain is not None and (against := _speaks_against(gain, decision)):
+        decision = decision.refused(against, refitted)
+        extended = refitted.extended()
+        gain, runs = gained(extended)
+    return decision, extended, gain, runs
 
 
 def _speaks_against(gain: Gain, decision: Decision) -> str:

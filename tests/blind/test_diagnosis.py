@@ -37,6 +37,8 @@ def test_what_was_hidden_is_said_and_nothing_else(seed, cause):
     if cause == "none":
         assert d.verdict in ("consistent", "undecided")
         assert d.findings == ()
+        laws = {"coulomb", "quadratic_damping", "bouc_wen", "maxwell", "delayed_force", "end_stop", "stiffness_drift"}
+        assert laws | {"force_gain", "channel_delay"} <= set(d.detectable)
         return
     assert d.verdict == ("parameters" if cause in VALUES else "cause")
     found = d.findings[0]
