@@ -224,7 +224,7 @@ def test_a_load_that_may_stand_for_the_drive_yields_to_whatever_leaves_nothing(p
         assert decision.winner is drift and decision.share(load) == 0.0 and "noisy drive" in decision.why[id(load)]
 
 
-@pytest.mark.parametrize(("gained", "verdict"), [(7.0, "parameters"), (14.0, "cause")])
+@pytest.mark.parametrize(("gained", "verdict"), [(21.0, "parameters"), (23.0, "cause")])
 def test_a_law_is_not_named_only_because_own_values_would_be_far_off_without_it(gained: float, verdict: str):
     own = Unknown("stiffness@0-1.k", 0.0, 1.0, True, 0.0, 0.02, degrees=1.5, low=-3.9, high=3.9)
     refitted, found = trial(1000.0, 0.0), trial(1000.0 + gained, 0.0, "sine_stiffness")
@@ -233,6 +233,21 @@ def test_a_law_is_not_named_only_because_own_values_would_be_far_off_without_it(
         (jfsm.SineStiffness(1.0, 1.0, at=(0, 1)),),
         SimpleNamespace(stiffness_of=lambda at: 1.0),
     )
+    decision = decide(GIVEN, refitted, [found], lambda t: None, lambda t: Unfit(0.0), periods=100.0)
+    assert decision.verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("law", "gained", "verdict"),
+    [
+        (jfsm.SineStiffness(1.0, 1.0, at=(0, 1)), 14.0, "parameters"),
+        (jfsm.SineStiffness(1.0, 1.0, at=(0, 1)), 16.0, "cause"),
+        (jfsm.Preload(1.0, at=(0, 1)), 14.0, "cause"),
+    ],
+)
+def test_beside_a_refit_that_leaves_nothing_a_law_must_gain_more_than_one_of_many_does_by_chance(law, gained, verdict):
+    refitted, found = trial(1000.0, 0.0), trial(1000.0 + gained, 0.0, "sine_stiffness")
+    found.laws, found.structure = (law,), SimpleNamespace(stiffness_of=lambda at: 1.0)
     decision = decide(GIVEN, refitted, [found], lambda t: None, lambda t: Unfit(0.0), periods=100.0)
     assert decision.verdict == verdict
 

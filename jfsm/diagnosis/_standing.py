@@ -13,7 +13,7 @@ from ._trial import Trial, ended, own_values
 _SECOND = 15.0
 """Nats by which two effects must beat either of them alone."""
 _UNPREDICTED = 15.0
-"""Nats by which a cause must beat a refit whose predictions leave nothing to explain, though its innovations do."""
+"""Nats by which a cause must beat a refit whose predictions leave nothing: of many, one gains some by chance."""
 _UNSEEN = 0.1
 """Nats by which a law must beat a special case of it for its further numbers to be seen."""
 _NEAR = 0.01
@@ -65,11 +65,14 @@ def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
     better = t.evidence - (given.evidence if same else max(given.evidence, refitted.evidence + spared))
     if better <= SIGNIFICANT:
         return f"no more probable than the model {'as given' if same else 'refitted'}"
+    # What shows over the whole record an unknown state may make up for over some periods, and these do not tell then.
+    unpredicted = not np.any(unexplained(refitted))
+    # A constant force is no more than an offset that the refit has, too: what is believed of that tells them.
+    if unpredicted and better <= _UNPREDICTED and any(not isinstance(law, Preload) for law in t.laws):
+        return "hardly more probable than the model refitted, which leaves nothing to explain"
     if over_refit >= GATE or (adequate(t) and over_given >= GATE):
         return ""
-    # What shows over the whole record an unknown state may make up for over some periods, and these do not tell then.
-    only_it_fits = adequate(t) and not adequate(refitted) and not np.any(unexplained(refitted))
-    if only_it_fits and better > _UNPREDICTED:
+    if unpredicted and better > _UNPREDICTED and adequate(t) and not adequate(refitted):
         return ""
     return f"explains {max(over_refit, 0.0):.0%} of what a refit leaves, less than half"
 
