@@ -149,6 +149,21 @@ def test_a_second_effect_is_looked_for_where_more_is_left_than_chance_leaves(lef
     assert something_left([refitted, best], refitted, lambda t: Unfit(0.0), imposed=False) == worth
 
 
+def leaving(t: Any, *power: float) -> Any:
+    """The trial with so much power beyond noise on either part of the record."""
+    t.prediction = Prediction(np.array(power) + NOISE, np.full(2, NOISE), np.full(2, NOISE / 10))
+    return t
+
+
+@pytest.mark.parametrize(("late", "two"), [(0.0, True), (1e-4, False)])
+def test_a_second_effect_may_show_in_one_part_of_a_decay_and_must_gain_wherever_the_first_leaves_anything(late, two):
+    single, pair = trial(8000.0, 0.02, "coulomb"), trial(9000.0, 0.0, "coulomb", "end_stop")
+    leaving(single, 0.02, late), leaving(pair, 0.0, late)
+    assert something_left([REFITTED, single], REFITTED, lambda t: Unfit(0.0), imposed=False) == (late == 0.0)
+    decision = decide(GIVEN, REFITTED, [single, pair], lambda t: None, lambda t: Unfit(0.0), periods=100.0)
+    assert (decision.winner is pair) == two
+
+
 @pytest.mark.parametrize(
     ("gained", "nats", "worth"), [(9000.0, 400.0, False), (9000.0, 500.0, True), (100.0, 15.0, False)]
 )

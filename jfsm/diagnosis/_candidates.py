@@ -14,6 +14,7 @@ from ..identification import (
     Hypothesis,
     Nuisances,
     Placed,
+    PlacedTogether,
     Unknown,
     about_a_rest,
     effect_unknown,
@@ -23,6 +24,7 @@ from ..identification import (
     nuisance_unknowns,
     own_unknown,
     place,
+    place_together,
     scale_of,
     with_offsets,
 )
@@ -201,6 +203,12 @@ class Laws:
         kind, sign = effect.cause.effect, effect.cause.sign
         law = kind(**kind.shapes(self.scale)[0], at=effect.at)
         return place(law, self.missing, self.structure, self.scale, self.nuisances, others, sign, sides=True)
+
+    def together(self, effects: Sequence[Effect], pairs: Sequence[tuple[int, int]]) -> list[PlacedTogether]:
+        """The best shapes of each of these `pairs` of laws, those first that explain most together."""
+        laws = [effect.cause.effect(**effect.cause.effect.shapes(self.scale)[0], at=effect.at) for effect in effects]
+        signs = [effect.cause.sign for effect in effects]
+        return place_together(laws, signs, pairs, self.missing, self.structure, self.scale, self.nuisances)
 
     def of(self, effect: Effect) -> list[Candidate]:
         """The law from where it explains most, and where it may rest elsewhere, from there."""

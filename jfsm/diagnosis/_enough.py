@@ -6,7 +6,7 @@ import numpy as np
 
 from ..identification import Unknown, prior
 from ..structures import AccelerationBias, AccelerationGain, ForceGain, Preload
-from ._adequacy import NEARLY_ALL, NEGLIGIBLE, SIGNIFICANT, adequate, almost_all, explained
+from ._adequacy import NEARLY_ALL, NEGLIGIBLE, SIGNIFICANT, adequate, almost_all, explained, unexplained
 from ._doubt import UNFIT, UNFIT_SHARE
 from ._lack_of_fit import Unfit
 from ._trial import Trial, ended, own_values
@@ -37,7 +37,9 @@ def something_left(
     if best.prediction.left < NEGLIGIBLE:
         gained = best.evidence - refitted.evidence
         return bool(best.effects) and lack_of_fit(best).nats > max(UNFIT_SHARE[2] * gained, UNFIT)
-    return bool(np.all(best.prediction.beyond >= WORTH_A_SECOND**2 * refitted.prediction.error))
+    shows = unexplained(best)  # one part of a decay may be too small to show the second effect
+    much = best.prediction.beyond >= WORTH_A_SECOND**2 * refitted.prediction.error
+    return bool(np.any(shows) and np.all(much[shows]))
 
 
 def hidden(trials: Sequence[Trial]) -> tuple[type, ...]:

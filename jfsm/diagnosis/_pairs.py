@@ -1,6 +1,7 @@
 """Two effects at once, where one leaves something: not the best one and then the next, but pairs of good ones."""
 
 from collections.abc import Sequence
+from itertools import combinations
 from typing import NamedTuple
 
 from ..identification import Nuisances
@@ -17,6 +18,8 @@ _PAIRS = 6
 """and of these pairs those that leave least."""
 _WITH_UNTOLD = 2
 """Bases beside which effects are tried that no missing force tells of, sensors' faults before all."""
+_TOGETHER = 4
+"""Pairs that are tried because their laws together explain most, whatever either explains alone."""
 _INSTEAD = 5
 """Laws that are tried instead of either effect of the best pair."""
 _ONE_SPRING = {QuadraticStiffness, CubicStiffness}
@@ -45,7 +48,26 @@ def pairs(
         if len(families) <= _WITH_UNTOLD:
             found += [pair for pair in beside if pair.left is None]
         found += _best(beside, _BESIDE)
-    return [pair.candidate for pair in found if pair.left is None] + [pair.candidate for pair in _best(found, _PAIRS)]
+    untold = [pair.candidate for pair in found if pair.left is None]
+    tried = untold + [pair.candidate for pair in _best(found, _PAIRS)]
+    done = {candidate.effects for candidate in tried}
+    return tried + [c for c in _together(effects, model, nuisances) if c.effects not in done]
+
+
+def _together(effects: Sequence[Effect], model: Structure, nuisances: Nuisances) -> list[Candidate]:
+    """Pairs of laws that together explain most of what the model lacks, the best of each two families."""
+    laws = [effect for effect in effects if not effect.cause.is_sensor]
+    in_order = [(i, j) if _in_order(laws[i], laws[j]) else (j, i) for i, j in combinations(range(len(laws)), 2)]
+    allowed = [(i, j) for i, j in in_order if _are_two(laws[i], laws[j])]
+    found: dict[tuple, Candidate] = {}
+    for placed in Laws(model, nuisances).together(laws, allowed):
+        pair = tuple(laws[i] for i in placed.laws)
+        families = tuple((effect.cause.family, effect.at) for effect in pair)
+        first, second = placed.terms
+        found.setdefault(families, Candidate(pair, (model + first + second,)))
+        if len(found) == _TOGETHER:
+            break
+    return list(found.values())
 
 
 def instead(pair: Trial, effects: Sequence[Effect], model: Structure, nuisances: Nuisances) -> list[Candidate]:

@@ -97,7 +97,8 @@ def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
                 return f"{alone.effects[0].label} alone is about as probable"
             continue
         gained = np.sqrt(alone.prediction.excess) - np.sqrt(t.prediction.excess)
-        enough = explained(t, alone) >= GATE and bool(np.all(gained >= WORTH_A_SECOND * size))
+        shows = unexplained(alone)
+        enough = explained(t, alone) >= GATE and bool(np.all((gained >= WORTH_A_SECOND * size)[shows]))
         if not enough or t.evidence - alone.evidence <= _SECOND:
             return f"{alone.effects[0].label} alone explains it about as well"
     return ""

@@ -38,7 +38,7 @@ _SHRINK = (1.0, 0.4, 0.16, 0.064)
 """Rounds in which the best shape is looked for between those that were tried, so many gaps of their grid wide."""
 _SPRING, _DASHPOT, _CONSTANT = 0.15, 1.0, 10.0
 """How far springs and dashpots may be off, as shares of themselves, and a constant force as a share of the missing."""
-_CORRELATED = 20.0
+CORRELATED = 20.0
 """Samples of a smoothed force that count as one."""
 _FINER = 8
 """Times as many steps for hidden states that the usual ones cannot follow, as stiff bristles'."""
@@ -174,8 +174,8 @@ def place(
     `sign` asks for that sign of the first number; a side stays as it is unless `sides` are to be tried. None are found
     where the missing force is no number.
     """
-    rows = _numbers(law, scale, sides)
-    regression = _Regression.of(law, latent, structure, nuisances, others)
+    rows = shapes_of(law, scale, sides)
+    regression = Regression.of(law, latent, structure, nuisances, others)
     if regression is None:
         return []  # a hidden state of the structure's own runs away along this motion
     columns, rows = regression.columns(rows)
@@ -212,7 +212,7 @@ class _Shape:
 
 
 @dataclass(frozen=True)
-class _Regression:
+class Regression:
     """A missing force regressed on those of a law, beside errors of springs, dashpots and constants, and other laws.
 
     `ridge` holds how well those are known: without that, a law that is partly linear has no size of its own.
@@ -236,7 +236,7 @@ class _Regression:
         structure: Structure,
         nuisances: Nuisances,
         others: Sequence[AbstractTerm],
-    ) -> "_Regression | None":
+    ) -> "Regression | None":
         """None where the missing force is no number."""
         n = len(latent.force)
         motion = _still_afterwards(latent, np.asarray(nuisances.record.time[:n]))
@@ -284,12 +284,12 @@ class _Regression:
         own = _regressed(columns, self.wanted, self.projector)[3]
         return bool(np.all(np.sum(own**2, 1) < _ALMOST_NONE * np.sum(columns**2, 1)))
 
-    def with_doubt(self, columns: np.ndarray) -> "_Regression":
+    def with_doubt(self, columns: np.ndarray) -> "Regression":
         """The regression with its ridge, from what the best of these forces leaves."""
         wanted = self.wanted
         left, gain, _, _ = _regressed(columns, wanted, self.projector)
         rest = max(np.min(left @ left - gain), 1e-12 * wanted.size)
-        return replace(self, ridge=np.diag(np.sqrt(_CORRELATED * rest / wanted.size) / self.doubt))
+        return replace(self, ridge=np.diag(np.sqrt(CORRELATED * rest / wanted.size) / self.doubt))
 
     def ranked(self, columns: np.ndarray, rows: list[dict[str, float]], sign: int, scale: Scale) -> Iterator[_Shape]:
         """Shapes that may be used, those first that explain most."""
@@ -298,12 +298,12 @@ class _Regression:
         padded = np.hstack([columns, np.zeros((len(columns), len(self.ridge)))])
         left, gain, size, padded = _regressed(padded, wanted, self.projector)
         power = np.maximum(np.sum(padded**2, 1), 1e-300)
-        one_sign = all(p.positive for p in kind.parameters if p.force)
-        opposite = [kind.opposite(row) if one_sign and s < 0 else None for row, s in zip(rows, size, strict=True)]
+        positive = one_sign(kind)
+        opposite = [kind.opposite(row) if positive and s < 0 else None for row, s in zip(rows, size, strict=True)]
         rows = [row if other is None else other for row, other in zip(rows, opposite, strict=True)]
         size = np.where([other is None for other in opposite], size, -size)
         usable = power > 1e-12 * self.missing.size
-        usable &= (size if one_sign else np.abs(size)) * rms > _LEAST * scale.force
+        usable &= (size if positive else np.abs(size)) * rms > _LEAST * scale.force
         if sign:
             first = np.array([next(iter(row.values())) for row in rows])
             usable &= np.sign(size * first) == sign
@@ -361,7 +361,12 @@ def about_a_rest(
     return Placed(term, 1.0 - left / before, left), max(rests, key=lambda rest: rest * curvature)
 
 
-def _numbers(law: AbstractTerm, scale: Scale, sides: bool) -> list[dict[str, float]]:
+def one_sign(kind: type[AbstractTerm]) -> bool:
+    """Whether a law's size must be positive."""
+    return all(p.positive for p in kind.parameters if p.force)
+
+
+def shapes_of(law: AbstractTerm, scale: Scale, sides: bool) -> list[dict[str, float]]:
     """Natural shapes of a law; a side that was chosen stays, and so does the origin of time."""
     if sides:
         return type(law).shapes(scale)
