@@ -158,7 +158,7 @@ def leaving(t: Any, *power: float) -> Any:
 @pytest.mark.parametrize(("late", "two"), [(0.0, True), (1e-4, False)])
 def test_a_second_effect_may_show_in_one_part_of_a_decay_and_must_gain_wherever_the_first_leaves_anything(late, two):
     single, pair = trial(8000.0, 0.02, "coulomb"), trial(9000.0, 0.0, "coulomb", "end_stop")
-    leaving(single, 0.02, late), leaving(pair, 0.0, late)
+    single, pair = leaving(single, 0.02, late), leaving(pair, 0.0, late)
     assert something_left([REFITTED, single], REFITTED, lambda t: Unfit(0.0), imposed=False) == (late == 0.0)
     decision = decide(GIVEN, REFITTED, [single, pair], lambda t: None, lambda t: Unfit(0.0), periods=100.0)
     assert (decision.winner is pair) == two
