@@ -186,7 +186,7 @@ def test_a_right_model_is_left_as_it_is():
 
 def test_a_right_model_with_a_law_of_its_own_is_left_as_it_is():
     right = jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING) + jfsm.CubicStiffness(CUBIC, at=(0, 1))
-    d = jfsm.diagnose(made(duffing, samples=630), right, causes=FEW)
+    d = jfsm.diagnose(made(duffing, samples=630), right, causes=FEW[1:4])
     assert d.verdict == "consistent"
     assert d.extended.values() == right.values()
 

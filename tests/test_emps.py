@@ -11,7 +11,7 @@ CAUSES = ("coulomb", "quadratic_damping", "position_damping", "periodic_disturba
 def test_dry_friction_is_named_on_the_measured_axis(shared_data):
     units, drive = {"displacement": "m"}, {"vir": "0.0284490 V/N"}  # the drive's voltage for a newton
     path = shared_data / "emps" / "DATA_EMPS.mat"
-    record = jfsm.read(path, force="vir", displacement="qm", units=units, sensitivity=drive).resample(50.0)
+    record = jfsm.read(path, force="vir", displacement="qm", units=units, sensitivity=drive).resample(100.0)
     axis = jfsm.Structure([95.0], [jfsm.LinearDamping(200.0, at=(0, 1)), jfsm.Preload(1.0, at=(0, 1))])
     d = jfsm.diagnose(record, axis, holdout=0.4, causes=CAUSES, max_causes=1, key=jax.random.key(0))
     assert d.verdict == "cause"

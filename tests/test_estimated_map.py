@@ -75,7 +75,7 @@ def estimated(motion):
 
 def test_from_displacement_alone_it_is_better_than_after_the_motion_and_its_error_bars_hold():
     covered, better = [], []
-    for seed in range(3):
+    for seed in range(2):
         motion = moved(cubic, seed=seed)
         record = seen(motion, 0.02, ("displacement",), seed)
         force_map = jfsm.estimate_force_map(record, MASS, trend="cubic")
@@ -83,7 +83,7 @@ def test_from_displacement_alone_it_is_better_than_after_the_motion_and_its_erro
         after = jfsm.Kriging.fit(readings.states, readings.force, trend="cubic")
         better.append(error_of(force_map, motion, cubic) / error_of(after, motion, cubic))
         covered.append(coverage(force_map, motion, cubic))
-    assert np.median(better) < 0.6
+    assert max(better) < 0.6
     assert np.mean(covered) > 0.8
 
 
