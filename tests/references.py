@@ -36,6 +36,22 @@ def smooth_motion(
     return motion[:, :dof], motion[:, dof:]
 
 
+def three_tones(t):
+    return 4 * np.cos(1.1 * t) + 3 * np.sin(2.3 * t + 1) + 3 * np.cos(3.7 * t + 2)
+
+
+def driven_readings(law: Law, time: np.ndarray) -> list[np.ndarray]:
+    """Force, displacement and velocity (n,), with 1 % noise, of ``a + 9 x + 0.3 v + law(x, v)`` = three tones, from
+    rest."""
+
+    def restoring(x, v):
+        return 9.0 * x + 0.3 * v + law(x, v)
+
+    x, v = smooth_motion(1.0, restoring, lambda t: np.array([three_tones(t)]), time, 0.0, 0.0, tolerance=1e-7)
+    rng = np.random.default_rng(4)
+    return [y + 0.01 * np.std(y) * rng.standard_normal(time.size) for y in (three_tones(time), x[:, 0], v[:, 0])]
+
+
 def sticking_motion(
     mass,
     damping,

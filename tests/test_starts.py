@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from references import smooth_motion
+from references import driven_readings, three_tones
 from scipy.integrate import solve_ivp
 
 import jfsm
@@ -20,18 +20,8 @@ T = np.arange(1200) * 0.06
 MODEL = jfsm.Structure.sdof(1.0, 9.0, 0.3)
 
 
-def drive(t):
-    return 4 * np.cos(1.1 * t) + 3 * np.sin(2.3 * t + 1) + 3 * np.cos(3.7 * t + 2)
-
-
 def record(law) -> jfsm.Record:
-    def restoring(x, v):
-        return 9.0 * x + 0.3 * v + law(x, v)
-
-    x, v = smooth_motion(1.0, restoring, lambda t: np.array([drive(t)]), T, 0.0, 0.0, tolerance=1e-7)
-    rng = np.random.default_rng(4)
-    noisy = [y + 0.01 * np.std(y) * rng.standard_normal(T.size) for y in (drive(T), x[:, 0], v[:, 0])]
-    return jfsm.Record(T, noisy[0], noisy[1], noisy[2], at_rest=True)
+    return jfsm.Record(T, *driven_readings(law, T), at_rest=True)
 
 
 def test_the_first_start_is_near_the_truth_wherever_the_search_stood():
@@ -50,11 +40,11 @@ def timed(force) -> jfsm.Record:
     """A record with a force that depends on time and displacement, known by all channels."""
 
     def motion(t, y):
-        return [y[1], drive(t) - 9.0 * y[0] - 0.3 * y[1] - force(t, y[0])]
+        return [y[1], three_tones(t) - 9.0 * y[0] - 0.3 * y[1] - force(t, y[0])]
 
     x, v = solve_ivp(motion, (0, T[-1]), [0.0, 0.0], t_eval=T, rtol=1e-9, atol=1e-12).y
     rng = np.random.default_rng(9)
-    noisy = [y + 0.01 * np.std(y) * rng.standard_normal(T.size) for y in (drive(T), x, v)]
+    noisy = [y + 0.01 * np.std(y) * rng.standard_normal(T.size) for y in (three_tones(T), x, v)]
     return jfsm.Record(T, noisy[0], noisy[1], noisy[2], at_rest=True)
 
 
@@ -293,15 +283,15 @@ def test_no_force_is_missing_where_a_channel_is_late_as_the_model_says(late):
     delay = 0.2
 
     def motion(t, y):
-        return [y[1], drive(t) - 9.0 * y[0] - 0.3 * y[1]]
+        return [y[1], three_tones(t) - 9.0 * y[0] - 0.3 * y[1]]
 
     x = solve_ivp(motion, (0, T[-1]), [0.0, 0.0], dense_output=True, rtol=1e-10, atol=1e-12).sol
     seen = {kind: np.maximum(T - delay * (kind == late), 0.0) for kind in ("force", "displacement")}
-    shown = {"force": drive(seen["force"]), "displacement": x(seen["displacement"])[0]}
+    shown = {"force": three_tones(seen["force"]), "displacement": x(seen["displacement"])[0]}
     rng = np.random.default_rng(2)
     r = jfsm.Record(T, **{kind: y + 0.01 * np.std(y) * rng.standard_normal(T.size) for kind, y in shown.items()})
     law = jfsm.ForceDelay if late == "force" else jfsm.ChannelDelay
     believed, mended = (missing_force(m, prepare(r, m)) for m in (MODEL, MODEL + law(delay, at=(late, 1))))
-    inner, whole = slice(50, -50), np.std(drive(T))
+    inner, whole = slice(50, -50), np.std(three_tones(T))
     assert np.std(believed.force[inner]) > 0.3 * whole
     assert np.std(mended.force[inner]) < 0.05 * whole

@@ -4,7 +4,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from references import smooth_motion
+from references import driven_readings
 
 import jfsm
 from jfsm.diagnosis._candidates import Candidate, candidates, chosen_causes
@@ -26,18 +26,8 @@ EITHER = (0,) * len(LAWS)
 PAIRS = list(combinations(range(len(LAWS)), 2))
 
 
-def drive(t):
-    return 4 * np.cos(1.1 * t) + 3 * np.sin(2.3 * t + 1) + 3 * np.cos(3.7 * t + 2)
-
-
 def record(law) -> jfsm.Record:
-    def restoring(x, v):
-        return 9.0 * x + 0.3 * v + law(x, v)
-
-    x, v = smooth_motion(1.0, restoring, lambda t: np.array([drive(t)]), T, 0.0, 0.0, tolerance=1e-7)
-    rng = np.random.default_rng(4)
-    noisy = [y + 0.01 * np.std(y) * rng.standard_normal(T.size) for y in (drive(T), x[:, 0], v[:, 0])]
-    return jfsm.Record(T, noisy[0], noisy[1], noisy[2], at_rest=True)
+    return jfsm.Record(T, *driven_readings(law, T), at_rest=True)
 
 
 def stopped_and_damped(x, v):

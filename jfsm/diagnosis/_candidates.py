@@ -200,15 +200,18 @@ class Laws:
 
     def placed(self, effect: Effect, others: Sequence[AbstractTerm] = ()) -> list[Placed]:
         """Shapes of a law that explain most; the sizes of `others`, which the structure has, are free beside it."""
-        kind, sign = effect.cause.effect, effect.cause.sign
-        law = kind(**kind.shapes(self.scale)[0], at=effect.at)
+        law, sign = self._law(effect), effect.cause.sign
         return place(law, self.missing, self.structure, self.scale, self.nuisances, others, sign, sides=True)
 
     def together(self, effects: Sequence[Effect], pairs: Sequence[tuple[int, int]]) -> list[PlacedTogether]:
         """The best shapes of each of these `pairs` of laws, those first that explain most together."""
-        laws = [effect.cause.effect(**effect.cause.effect.shapes(self.scale)[0], at=effect.at) for effect in effects]
-        signs = [effect.cause.sign for effect in effects]
+        laws, signs = [self._law(effect) for effect in effects], [effect.cause.sign for effect in effects]
         return place_together(laws, signs, pairs, self.missing, self.structure, self.scale, self.nuisances)
+
+    def _law(self, effect: Effect) -> AbstractTerm:
+        """The law at its place, in the first of its natural shapes."""
+        kind = effect.cause.effect
+        return kind(**kind.shapes(self.scale)[0], at=effect.at)
 
     def of(self, effect: Effect) -> list[Candidate]:
         """The law from where it explains most, and where it may rest elsewhere, from there."""

@@ -312,7 +312,7 @@ class Regression:
         for k in np.argsort(-np.where(usable, gain, -np.inf)):
             if usable[k]:
                 share = float(gain[k]) / total
-                numbers = {p.name: rows[k][p.name] * (size[k] if p.force else 1.0) for p in kind.parameters}
+                numbers = of_size(kind, rows[k], size[k])
                 yield _Shape(rows[k], numbers, share, (1 - share) * mean, padded[k] / np.sqrt(power[k]))
 
     def polished(self, shape: _Shape, grid: Mapping[str, np.ndarray], sign: int, scale: Scale) -> _Shape:
@@ -364,6 +364,11 @@ def about_a_rest(
 def one_sign(kind: type[AbstractTerm]) -> bool:
     """Whether a law's size must be positive."""
     return all(p.positive for p in kind.parameters if p.force)
+
+
+def of_size(kind: type[AbstractTerm], row: Mapping[str, float], size: float) -> dict[str, float]:
+    """Numbers of a shape with all that hold a force so many times larger."""
+    return {p.name: row[p.name] * (size if p.force else 1.0) for p in kind.parameters}
 
 
 def shapes_of(law: AbstractTerm, scale: Scale, sides: bool) -> list[dict[str, float]]:

@@ -12,7 +12,7 @@ import numpy as np
 from ..estimation import Latent
 from ..structures import AbstractTerm, Scale, Structure
 from ._nuisances import Nuisances
-from ._starts import CORRELATED, Regression, one_sign, shapes_of
+from ._starts import CORRELATED, Regression, of_size, one_sign, shapes_of
 
 _APART = 1e-3
 """Share of a shape's power that another does not make, below which the two are one."""
@@ -42,7 +42,7 @@ class _Shapes(NamedTuple):
         kind, row = type(self.law), self.rows[k]
         other = kind.opposite(row) if size < 0 and one_sign(kind) else None
         row, size = (row, size) if other is None else (other, -size)
-        return kind(**{p.name: row[p.name] * (size if p.force else 1.0) for p in kind.parameters}, at=self.law.at)
+        return kind(**of_size(kind, row, size), at=self.law.at)
 
 
 def place_together(
