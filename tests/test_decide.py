@@ -159,16 +159,25 @@ def leaving(t: Any, *power: float) -> Any:
 def test_a_second_effect_may_show_in_one_part_of_a_decay_and_must_gain_wherever_the_first_leaves_anything(late, two):
     single, pair = trial(8000.0, 0.02, "coulomb"), trial(9000.0, 0.0, "coulomb", "end_stop")
     single, pair = leaving(single, 0.02, late), leaving(pair, 0.0, late)
-    assert something_left([REFITTED, single], REFITTED, lambda t: Unfit(0.0), imposed=False) == (late == 0.0)
+    assert something_left([REFITTED, single], REFITTED, lambda t: Unfit(0.0), imposed=False)
     decision = decide(GIVEN, REFITTED, [single, pair], lambda t: None, lambda t: Unfit(0.0), periods=100.0)
     assert (decision.winner is pair) == two
 
 
 @pytest.mark.parametrize(
-    ("gained", "nats", "worth"), [(9000.0, 400.0, False), (9000.0, 500.0, True), (100.0, 15.0, False)]
+    ("gained", "left", "nats", "worth"),
+    [
+        (9000.0, 3e-4, 400.0, False),
+        (9000.0, 3e-4, 500.0, True),
+        (100.0, 3e-4, 15.0, False),
+        (9000.0, 0.0, 12.0, False),
+        (9000.0, 0.0, 18.0, True),
+    ],
 )
-def test_a_second_effect_is_looked_for_where_little_is_left_but_other_shapes_would_explain_much(gained, nats, worth):
-    refitted, best = trial(0.0, 1.0), trial(gained, 3e-4, "coulomb")
+def test_a_second_effect_is_looked_for_where_little_is_left_but_other_shapes_would_explain_much(
+    gained, left, nats, worth
+):
+    refitted, best = trial(0.0, 1.0), trial(gained, left, "coulomb")
     assert something_left([refitted, best], refitted, lambda t: Unfit(nats), imposed=False) == worth
 
 

@@ -126,18 +126,24 @@ def test_a_buckled_spring_is_told_from_a_quadratic_one_by_accelerations_alone():
     assert d.findings[0].parameters["k3"].value == pytest.approx(CUBIC, rel=0.1)
 
 
-def test_what_shows_only_in_the_part_that_was_kept_back_is_named_from_there():
-    whole = made(linear, samples=1000, seed=5)
+@pytest.mark.parametrize("damping", [0.0, 0.1])
+def test_what_shows_only_in_the_part_that_was_kept_back_is_named_from_there(damping):
+    def damped(x, v):
+        return linear(x, v) + damping * v * np.abs(v)
+
+    whole = made(damped, samples=1000, seed=5)
     assert whole.displacement is not None
     gap = 1.05 * np.max(np.abs(whole.displacement[:700]))
 
     def stopped(x, v):
-        return linear(x, v) + 60.0 * np.sign(x) * np.maximum(np.abs(x) - gap, 0.0)
+        return damped(x, v) + 200.0 * np.sign(x) * np.maximum(np.abs(x) - gap, 0.0)
 
     record = made(stopped, samples=1000, seed=5)
-    d = jfsm.diagnose(record, jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING), causes=("end_stop", "cubic_hardening"))
-    assert [f.cause for f in d.findings] == ["end_stop"]
-    assert d.findings[0].parameters["gap"].value == pytest.approx(gap, rel=0.05)
+    few = ("end_stop", "quadratic_damping")
+    d = jfsm.diagnose(record, jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING), causes=few, key=jax.random.key(0))
+    assert {f.cause for f in d.findings} == {"end_stop", *(("quadratic_damping",) if damping else ())}
+    [stop] = [f for f in d.findings if f.cause == "end_stop"]
+    assert stop.parameters["gap"].value == pytest.approx(gap, rel=0.05)
     assert any("last part" in note for note in d.notes) and d.gain is not None
 
 

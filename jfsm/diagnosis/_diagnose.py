@@ -13,7 +13,7 @@ from ..dynamics import Reconstruction
 from ..identification import Nuisances, prepare_all
 from ..records import Record
 from ..structures import Cause, Structure
-from ._adequacy import GATE, NEGLIGIBLE, adequate, explained, white
+from ._adequacy import GATE, MUCH, NEGLIGIBLE, adequate, explained, white
 from ._candidates import Candidate, candidates, chosen_causes, contained, promising
 from ._chance import beside_chance, noise_beyond, noise_levels
 from ._clipped import beside_clipping, limited
@@ -105,13 +105,13 @@ def diagnose(
     steps = _Steps(progress, 5)
 
     steps.next("the model as given and refitted")
-    records, until, given, refitted = _believed(training, model, reconstruction)
-    if held and isinstance(holdout, float) and _later(refitted):
-        # What shows only in the part that was kept back has to be fitted; as much is kept back of the first part.
+    study = _Study(model, chosen, places, reconstruction, key, steps.next, pairs=max_causes > 1)
+    studied = study.of(training, unless_later=isinstance(holdout, float))
+    if studied is None:  # as much is kept back of the first part
         training, held = split(record, holdout, first=True)
-        records, until, given, refitted = _believed(training, model, reconstruction)
-    every = candidates(model, records, chosen, places)
-    found = _searched(every, model, given, refitted, records, until, key, steps.next, pairs=max_causes > 1)
+        studied = study.of(training)
+        assert studied is not None
+    records, until, every, found = studied
     steps.next("the verdict")
     records, found, decision = _decided(found, records, until)
     if clipped:
@@ -151,6 +151,35 @@ class _Searched:
     @property
     def every(self) -> list[Trial]:
         return [self.given, self.refitted, *self.trials]
+
+
+@dataclass(frozen=True)
+class _Study:
+    """How records are looked into."""
+
+    model: Structure
+    chosen: dict[str, Cause]
+    places: Sequence[tuple[int, int]] | None
+    reconstruction: Reconstruction
+    key: jax.Array
+    tell: Callable[[str, int], None]
+    pairs: bool
+
+    def of(
+        self, training: Sequence[tuple[Record, int]], *, unless_later: bool = False
+    ) -> tuple[list[Nuisances], list[int], list[Candidate], _Searched] | None:
+        """Records as the likelihood sees them, how many samples are fitted, what could be tried, what was found.
+
+        None where what the model lacks shows in what was kept back, which then has to be fitted, `unless_later`.
+        """
+        records, until, given, refitted = _believed(training, self.model, self.reconstruction)
+        if unless_later and _later(refitted, NEGLIGIBLE):
+            return None
+        every = candidates(self.model, records, self.chosen, self.places)
+        found = _searched(every, self.model, given, refitted, records, until, self.key, self.tell, pairs=self.pairs)
+        if unless_later and _later(max(found.every, key=lambda t: t.evidence), MUCH):
+            return None
+        return records, until, every, found
 
 
 def _searched(
@@ -283,10 +312,10 @@ def _speaks_against(gain: Gain, decision: Decision) -> str:
     return ""
 
 
-def _later(refitted: Trial) -> bool:
-    """Whether own values alone leave nothing of what was fitted, but much of what was kept back."""
-    fitted, kept_back = (np.sqrt(refitted.prediction.beyond[first::2]) for first in (0, 1))
-    return white(refitted) and bool(np.all(fitted < NEGLIGIBLE) and np.any(kept_back > NEGLIGIBLE))
+def _later(trial: Trial, much: float) -> bool:
+    """Whether a trial leaves nothing of what was fitted, but `much` of what was kept back, as a share of the signal."""
+    fitted, kept_back = (np.sqrt(trial.prediction.beyond[first::2]) for first in (0, 1))
+    return white(trial) and bool(np.all(fitted < NEGLIGIBLE) and np.any(kept_back > much))
 
 
 def _beside(

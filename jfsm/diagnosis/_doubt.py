@@ -10,7 +10,7 @@ not to be named,"""
 UNFIT_SHARE = {0: 0.02, 1: 0.1, 2: 0.05}
 """and share of the nats that its last effect gains, of own values, one effect or two: own values make up for many a
 law, and two together stand for many a single one."""
-_UNFIT_OF_WHITE = (15.0, 0.005)
+UNFIT_OF_WHITE, _SHARE_OF_WHITE = 15.0, 0.005
 """The same where innovations are white: all else is right then, and chance is known. Of a hundred laws that are right
 one leaves as many nats."""
 _UNFIT_OF_REST = 0.5
@@ -20,8 +20,7 @@ _UNFIT_OF_REST = 0.5
 def doubt(winner: Trial, gained: float, unfit: Unfit) -> float:
     """How far laws of other shapes gain beside the winner, whose last effect gained so many nats; above 1: too much."""
     if white(winner):
-        least, share = _UNFIT_OF_WHITE
-        return _beyond(unfit.nats, least, share * gained)
+        return _beyond(unfit.nats, UNFIT_OF_WHITE, _SHARE_OF_WHITE * gained)
     return max(_beyond(unfit.nats, UNFIT, UNFIT_SHARE[len(winner.effects)] * gained), unfit.share / _UNFIT_OF_REST)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from ..identification import Unknown, prior
 from ..structures import AccelerationBias, AccelerationGain, ForceGain, Preload
 from ._adequacy import NEARLY_ALL, NEGLIGIBLE, SIGNIFICANT, adequate, almost_all, explained, unexplained
-from ._doubt import UNFIT, UNFIT_SHARE
+from ._doubt import UNFIT, UNFIT_OF_WHITE, UNFIT_SHARE
 from ._lack_of_fit import Unfit
 from ._trial import Trial, ended, own_values
 
@@ -32,14 +32,15 @@ def something_left(
 ) -> bool:
     """Whether the best of them leaves enough for a second effect to be worth a search: what a pair has to gain."""
     best = max(trials, key=lambda t: t.evidence)
-    if adequate(best) or (imposed and almost_all(best, refitted)):
+    if imposed and almost_all(best, refitted):
         return False
     if best.prediction.left < NEGLIGIBLE:
         gained = best.evidence - refitted.evidence
-        return bool(best.effects) and lack_of_fit(best).nats > max(UNFIT_SHARE[2] * gained, UNFIT)
-    shows = unexplained(best)  # one part of a decay may be too small to show the second effect
-    much = best.prediction.beyond >= WORTH_A_SECOND**2 * refitted.prediction.error
-    return bool(np.any(shows) and np.all(much[shows]))
+        least = UNFIT_OF_WHITE if adequate(best) else max(UNFIT_SHARE[2] * gained, UNFIT)
+        return bool(best.effects) and lack_of_fit(best).nats > least
+    # One part of a decay may be too small to show the second effect: all parts tell together.
+    much = np.sum(best.prediction.beyond) >= WORTH_A_SECOND**2 * np.sum(refitted.prediction.error)
+    return bool(much and np.any(unexplained(best)))
 
 
 def hidden(trials: Sequence[Trial]) -> tuple[type, ...]:

@@ -20,7 +20,7 @@ _WITH_UNTOLD = 2
 """Bases beside which effects are tried that no missing force tells of, sensors' faults before all."""
 _TOGETHER = 4
 """Pairs that are tried because their laws together explain most, whatever either explains alone."""
-_INSTEAD = 5
+_INSTEAD = 8
 """Laws that are tried instead of either effect of the best pair."""
 _ONE_SPRING = {QuadraticStiffness, CubicStiffness}
 """Laws of one family that are two effects all the same: the parts of an asymmetric spring."""

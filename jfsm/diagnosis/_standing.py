@@ -88,7 +88,7 @@ def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
         return ""
     singles = [alone for alone in tried if len(alone.effects) == 1]
     best = max(singles, key=lambda alone: alone.evidence, default=refitted)
-    size = np.sqrt(refitted.prediction.error)
+    size = _size(refitted.prediction.error)
     for alone in singles:
         if alone is not best and alone.effects[0] not in t.effects:
             continue
@@ -96,9 +96,13 @@ def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
             if t.evidence - alone.evidence <= SIGNIFICANT:
                 return f"{alone.effects[0].label} alone is about as probable"
             continue
-        gained = np.sqrt(alone.prediction.excess) - np.sqrt(t.prediction.excess)
-        shows = unexplained(alone)
-        enough = explained(t, alone) >= GATE and bool(np.all((gained >= WORTH_A_SECOND * size)[shows]))
+        gained = _size(alone.prediction.excess) - _size(t.prediction.excess)
+        enough = explained(t, alone) >= GATE and gained >= WORTH_A_SECOND * size
         if not enough or t.evidence - alone.evidence <= _SECOND:
             return f"{alone.effects[0].label} alone explains it about as well"
     return ""
+
+
+def _size(powers: np.ndarray) -> float:
+    """Of errors on all sets together; one part of a decay may be too small to show anything."""
+    return math.sqrt(float(np.sum(powers)))
