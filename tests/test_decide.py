@@ -366,6 +366,21 @@ def test_where_predictions_leave_nothing_evidence_alone_may_name_what_alone_leav
     assert decision.verdict == verdict
 
 
+@pytest.mark.parametrize(
+    ("law", "gained", "verdict"),
+    [
+        (jfsm.Preload(1.0, at=(0, 1)), 20.0, "cause"),
+        (jfsm.Preload(1.0, at=(0, 1)), 10.0, "consistent"),
+        (jfsm.SineStiffness(1.0, 1.0, at=(0, 1)), 20.0, "consistent"),
+    ],
+)
+def test_a_constant_force_that_an_offset_stands_for_is_told_by_evidence_alone(law, gained: float, verdict: str):
+    given, found = trial(-2.0, 0.0), trial(gained, 0.0, "preload")
+    found.laws, found.structure = (law,), SimpleNamespace(stiffness_of=lambda at: 1.0)
+    decision = decide(given, trial(0.0, 0.0), [found], lambda t: None, lambda t: Unfit(0.0), periods=100.0)
+    assert decision.verdict == verdict
+
+
 @pytest.mark.parametrize(("kappa", "low", "named"), [(0.0, 0.3, True), (0.0, -0.3, False), (0.6, -0.3, True)])
 def test_what_no_prediction_shows_is_named_if_the_held_out_run_confirms_it(kappa: float, low: float, named: bool):
     winner = trial(9000.0, 0.0, "preload")

@@ -67,14 +67,21 @@ def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
         return f"no more probable than the model {'as given' if same else 'refitted'}"
     # What shows over the whole record an unknown state may make up for over some periods, and these do not tell then.
     unpredicted = not np.any(unexplained(refitted))
-    # A constant force is no more than an offset that the refit has, too: what is believed of that tells them.
-    if unpredicted and better <= _UNPREDICTED and any(not isinstance(law, Preload) for law in t.laws):
+    if unpredicted and better <= _UNPREDICTED and t.laws and not _is_constant(t):
         return "hardly more probable than the model refitted, which leaves nothing to explain"
     if over_refit >= GATE or (adequate(t) and over_given >= GATE):
         return ""
-    if unpredicted and better > _UNPREDICTED and adequate(t) and not adequate(refitted):
+    if unpredicted and better > _UNPREDICTED and adequate(t) and (_is_constant(t) or not adequate(refitted)):
         return ""
     return f"explains {max(over_refit, 0.0):.0%} of what a refit leaves, less than half"
+
+
+def _is_constant(t: Trial) -> bool:
+    """Whether it is no more than a constant force, for which the refit has an offset, too.
+
+    What tells them is what is believed of that, and the swing with which the force sets in; predictions are the same.
+    """
+    return bool(t.laws) and all(isinstance(law, Preload) for law in t.laws)
 
 
 def _hides_one(t: Trial) -> bool:
