@@ -1,10 +1,13 @@
 """What is tried, and where: laws on links and masses, and the unknowns that go with them."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 import jfsm
-from jfsm.diagnosis._candidates import Candidate, candidates, chosen_causes, contained, hypothesis, own_paths
+from jfsm.diagnosis._candidates import Candidate, candidates, chosen_causes, contained, hypothesis, own_paths, resting
 from jfsm.diagnosis._effect import Effect
 from jfsm.identification import Nuisances, prepare
 
@@ -71,3 +74,21 @@ def test_the_special_cases_of_a_law_are_followed_where_it_is(shaken):
 def test_a_special_case_that_explains_nothing_is_not_followed():
     idle = Candidate((Effect(chosen_causes(["jenkins"])["jenkins"], (0, 1)),), ())
     assert contained([jfsm.FreePlay(1.0, 0.1, 1.0, 1.0, at=(0, 1))], [idle]) == []
+
+
+@pytest.mark.parametrize(("channel", "tried"), [("acceleration", True), ("displacement", False)])
+def test_a_quadratic_spring_about_a_rest_that_nothing_tells_is_a_well_of_two(channel: str, tried: bool):
+    well, model = jfsm.DoubleWell(25.0, 40.0, at=(0, 1)), jfsm.Structure.sdof(2.0, 18.0, 0.5)
+    rest = -np.sqrt((25.0 - 18.0) / 40.0)
+    slope, curvature = -25.0 + 3 * 40.0 * rest**2, 3 * 40.0 * rest
+    found = jfsm.Structure.sdof(2.1, 18.0 + slope, 0.6) + jfsm.QuadraticStiffness(curvature, at=(0, 1))
+    seen: Any = SimpleNamespace(at_rest=False, path=None, channels=((channel, 1),))
+    among = [Candidate((Effect(jfsm.causes()[cause], (0, 1)),), ()) for cause in ("double_well", "cubic_hardening")]
+    cases = resting(found, found.terms[-1], among, model, seen)
+    assert bool(cases) == tried
+    for case in cases:
+        assert case.effects[0].cause.id == "double_well" and case.own is not None
+        np.testing.assert_allclose(case.starts[0].terms[-1].values, well.values)
+        assert (
+            case.own["x0@1"] == pytest.approx(rest) and case.own["mass@1"] == 2.1 and "stiffness@0-1.k" not in case.own
+        )

@@ -165,6 +165,28 @@ def test_a_second_effect_may_show_in_one_part_of_a_decay_and_must_gain_wherever_
 
 
 @pytest.mark.parametrize(
+    ("second", "left", "whiteness", "gained", "two"),
+    [
+        ("preload", 3e-4, 0.2, 20.0, True),  # an offset stands for it, and innovations tell
+        ("preload", 3e-4, 0.2, 10.0, False),
+        ("preload", 0.0, 0.05, 10.0, True),
+        ("cubic_hardening", 0.0, 0.05, 20.0, True),  # noise hides it from every prediction
+        ("cubic_hardening", 0.0, 0.05, 10.0, False),
+        ("cubic_hardening", 3e-4, 0.2, 20.0, False),
+    ],
+)
+def test_a_second_effect_that_predictions_do_not_tell_is_told_by_evidence(second, left, whiteness, gained, two):
+    single, pair = trial(8000.0, left, "coulomb"), trial(8000.0 + gained, left / 2, "coulomb", second)
+    single.whiteness, pair.whiteness = whiteness, 0.02
+    law = jfsm.Preload(1.0, at=(0, 1)) if second == "preload" else jfsm.CubicStiffness(1.0, at=(0, 1))
+    single.laws, pair.laws = (jfsm.Coulomb(1.0, at=(0, 1)),), (jfsm.Coulomb(1.0, at=(0, 1)), law)
+    for t in (single, pair):
+        t.structure = SimpleNamespace(stiffness_of=lambda at: 1.0)
+    decision = decide(GIVEN, REFITTED, [single, pair], lambda t: None, lambda t: Unfit(0.0), periods=100.0)
+    assert (decision.winner is pair) == two
+
+
+@pytest.mark.parametrize(
     ("gained", "left", "nats", "worth"),
     [
         (9000.0, 3e-4, 400.0, False),

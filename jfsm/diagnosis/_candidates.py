@@ -41,6 +41,7 @@ from ..structures import (
     ForceGain,
     PeriodicDisturbance,
     Preload,
+    QuadraticStiffness,
     Structure,
     causes,
 )
@@ -181,6 +182,45 @@ def late_instead(
     return [replace(other, starts=(late,), own=values_found(model, found))]
 
 
+def resting(
+    found: Structure, law: AbstractTerm, among: Sequence[Candidate], model: Structure, nuisances: Nuisances
+) -> list[Candidate]:
+    """Laws with a rest of their own that are, about it, the quadratic spring that was found, where none tells where
+    the motion is."""
+    if not isinstance(law, QuadraticStiffness) or not _may_rest_anywhere(model, nuisances):
+        return []
+    stiffness, softer = model.stiffness_of(law.at), found.without(law).stiffness_of(law.at)
+    own = {path: value for path, value in values_found(model, found).items() if not path.startswith("stiffness@")}
+    cases = {}
+    for c in among:
+        effect = c.effects[0]
+        if len(c.effects) > 1 or effect.at != law.at or effect.cause.is_sensor:
+            continue
+        kind, curvature = effect.cause.effect, float(law.k2)
+        numbers = kind.about_a_rest(stiffness, softer - stiffness, curvature)
+        if numbers is None:
+            continue
+        term = kind(**numbers, at=law.at)
+        rest = max(term.rests(stiffness), key=lambda rest: rest * curvature)
+        cases[c.effects] = replace(c, starts=(model + term,), own=own | _begin(law.at, rest))
+    return list(cases.values())
+
+
+def _may_rest_anywhere(structure: Structure, nuisances: Nuisances) -> bool:
+    """Whether one degree of freedom moves about a rest of which nothing tells where it is."""
+    return structure.dof == 1 and not nuisances.at_rest and not _tells_where(nuisances)
+
+
+def _tells_where(nuisances: Nuisances) -> bool:
+    """Whether anything tells where the motion is."""
+    return nuisances.path is not None or any(kind == "displacement" for kind, _ in nuisances.channels)
+
+
+def _begin(at: tuple, rest: float) -> dict[str, float]:
+    """Where the motion begins if the link at such a place is stretched by `rest`."""
+    return {"x0@1": rest if at == (0, 1) else -rest}
+
+
 def values_found(model: Structure, found: Structure) -> dict[str, float]:
     """The model's own values as a structure that extends it has them."""
     values = found.values()
@@ -228,29 +268,20 @@ class Laws:
 
     def _otherwise_directed(self, placed: Sequence[Placed]) -> list[AbstractTerm]:
         """The best shape with its sign changed, of a load whose force and motion nothing but an acceleration tells."""
-        if not placed or self._seen or not isinstance(placed[0].term, PeriodicDisturbance):
+        if not placed or _tells_where(self.nuisances) or not isinstance(placed[0].term, PeriodicDisturbance):
             return []
         term = placed[0].term
         return [eqx.tree_at(lambda t: t.phase, term, term.phase + math.pi)]
 
-    @property
-    def _seen(self) -> bool:
-        """Whether anything tells where the motion is."""
-        seen = self.nuisances
-        return seen.path is not None or any(kind == "displacement" for kind, _ in seen.channels)
-
     def about_a_rest(self, effect: Effect) -> list[Candidate]:
         """A law that may rest elsewhere than at zero, beginning there, where no channel tells where the motion is."""
-        seen = self.nuisances
-        known = seen.at_rest or seen.path is not None or any(kind == "displacement" for kind, _ in seen.channels)
-        if known or self.structure.dof > 1:
+        if not _may_rest_anywhere(self.structure, self.nuisances):
             return []
         found = about_a_rest(effect.cause.effect, effect.at, self.missing, self.structure)
         if found is None:
             return []
         placed, rest = found
-        begin = rest if effect.at == (0, 1) else -rest
-        return [Candidate((effect,), (self.structure + placed.term,), placed.share, {"x0@1": begin})]
+        return [Candidate((effect,), (self.structure + placed.term,), placed.share, _begin(effect.at, rest))]
 
 
 def _shows(effect: type, kind: str, records: Sequence[Nuisances]) -> bool:

@@ -18,12 +18,13 @@ WORTH_A_SECOND = 0.03
 def settled(trials: Sequence[Trial], refitted: Trial) -> bool:
     """Whether the best of them leaves nothing but noise, or one explains nearly all; its laws what they are called."""
     best = max(trials, key=lambda t: t.evidence)
-    return (adequate(best) and _is_itself(best)) or any(
-        explained(t, refitted) >= NEARLY_ALL and _is_itself(t) for t in trials if t.effects
+    return (adequate(best) and is_itself(best)) or any(
+        explained(t, refitted) >= NEARLY_ALL and is_itself(t) for t in trials if t.effects
     )
 
 
-def _is_itself(t: Trial) -> bool:
+def is_itself(t: Trial) -> bool:
+    """Whether none of its laws is, with the numbers found, another one."""
     return not any(law.otherwise(t.structure.stiffness_of(law.at)) for law in t.laws)
 
 

@@ -10,9 +10,10 @@ import numpy as np
 from .._threads import compiled_once, side_by_side
 from ..identification import LADDER, LANES, Maximum, Nuisances, Posterior, approach, finish, lanes_of, rungs
 from ..structures import Structure
-from ._adequacy import GATE, explained
-from ._candidates import Candidate, hypothesis, late_instead, special_cases, values_found
+from ._adequacy import GATE, SIGNIFICANT, explained
+from ._candidates import Candidate, hypothesis, late_instead, resting, special_cases, values_found
 from ._effect import Effect
+from ._enough import is_itself
 from ._pairs import instead, pairs
 from ._trial import Trial, trial
 
@@ -198,11 +199,13 @@ def search_akin(
     until: Sequence[int],
     tell: Callable[[str, int], None],
 ) -> Found:
-    """Special cases of laws that come close, and late channels instead of early ones, fitted from their numbers too.
+    """What is akin to laws that come close, special cases and others, and late channels instead of early ones, fitted
+    from their numbers too.
 
     From elsewhere they may have stopped on the way.
     """
     tried = [c for t in close for law in t.laws for c in special_cases(t.structure, law, every, model)]
+    tried += [c for t in close for law in t.laws for c in resting(t.structure, law, every, model, records[0])]
     tried += [c for t in close for part in t.parts for c in late_instead(t.structure, part, every, model)]
     if not tried:
         return known
@@ -230,8 +233,9 @@ def search_pairs(
         return _climbed(lots, _TOGETHER, [], best, tell)
 
     first = climbed(pairs(singles, effects, model, records[0]))
-    leader = max(first.trials, key=lambda t: t.evidence, default=best)
-    if explained(leader, best) < GATE:
+    named = [t for t in first.trials if is_itself(t)]
+    leader = max(named, key=lambda t: t.evidence, default=best)
+    if explained(leader, best) < GATE and leader.evidence - best.evidence < SIGNIFICANT:
         return first
     done = {one.effects for one in (*first.trials, *first.behind)}
     near = instead(leader, effects, model, records[0])

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..structures import Preload
-from ._adequacy import GATE, SIGNIFICANT, adequate, explained, unexplained
+from ._adequacy import GATE, NEGLIGIBLE, SIGNIFICANT, adequate, explained, unexplained
 from ._enough import WORTH_A_SECOND, strain
 from ._trial import Trial, ended, own_values
 
@@ -99,8 +99,10 @@ def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
     for alone in singles:
         if alone is not best and alone.effects[0] not in t.effects:
             continue
-        if adequate(t) and adequate(alone) and _hides_one(t):
-            if t.evidence - alone.evidence <= SIGNIFICANT:
+        hides = _hides_one(t) and alone.prediction.left < NEGLIGIBLE
+        if adequate(t) and (hides or not np.any(unexplained(alone))):  # predictions do not tell
+            least = SIGNIFICANT if hides and adequate(alone) else _SECOND
+            if t.evidence - alone.evidence <= least:
                 return f"{alone.effects[0].label} alone is about as probable"
             continue
         gained = _size(alone.prediction.excess) - _size(t.prediction.excess)
