@@ -29,14 +29,14 @@ def test_a_special_case_begins_from_the_numbers_of_the_law_that_holds_it():
 def test_an_early_channel_is_a_late_other_one():
     known = causes()
 
-    def delay(kind, at) -> Candidate:
-        return Candidate((Effect(known[kind], at),), (MODEL,))
+    def delay(kind, at) -> Effect:
+        return Effect(known[kind], at)
 
     force, channel = delay("force_delay", ("force", 1)), delay("channel_delay", ("displacement", 1))
     early = jfsm.ForceDelay(-0.04, at=("force", 1))
     found = MODEL.with_values({"stiffness@0-1.k": 8.0}) + early
     (late,) = late_instead(found, early, [force, channel], MODEL)
-    assert late.effects == channel.effects
+    assert late.effects == (channel,)
     assert late.starts[0].values() == MODEL.values() | {"channel_delay@displacement-1.tau": 0.04}
     assert late.own == MODEL.values() | {"stiffness@0-1.k": 8.0}
     assert late_instead(found, jfsm.ForceDelay(0.04, at=("force", 1)), [force, channel], MODEL) == []

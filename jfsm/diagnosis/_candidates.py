@@ -168,18 +168,21 @@ def special_cases(found: Structure, law: AbstractTerm, among: Sequence[Candidate
 
 
 def late_instead(
-    found: Structure, early: AbstractTerm | AbstractSensor, among: Sequence[Candidate], model: Structure
+    found: Structure, early: AbstractTerm | AbstractSensor, effects: Sequence[Effect], model: Structure
 ) -> list[Candidate]:
     """The delay of the other one of two channels, of which one was found to be early."""
+    return [
+        Candidate((effect,), (model + late,), own=values_found(model, found))
+        for effect, late in other_delay(early, effects)
+    ]
+
+
+def other_delay(early: AbstractTerm | AbstractSensor, effects: Sequence[Effect]) -> list[tuple[Effect, AbstractSensor]]:
+    """The channel that is late where another one seems to be early; of three, one is late as none of the others is."""
     if not isinstance(early, ForceDelay | ChannelDelay) or early.tau >= 0:
         return []
-    delays = [c for c in among if len(c.effects) == 1 and c.effects[0].cause.effect in (ForceDelay, ChannelDelay)]
-    if len(delays) != 2:  # of three one is late as none of the others is early
-        return []
-    other = next(c for c in delays if c.effects[0].at != early.at)
-    [(cause, at)] = other.effects
-    late = model + cause.effect(-early.tau, at=at)
-    return [replace(other, starts=(late,), own=values_found(model, found))]
+    others = [e for e in effects if e.cause.effect in (ForceDelay, ChannelDelay) and e.at != early.at]
+    return [(effect, effect.cause.effect(-early.tau, at=effect.at)) for effect in others if len(others) == 1]
 
 
 def resting(

@@ -26,3 +26,8 @@ def names(effects: Sequence[Effect]) -> str:
 def places(effects: Sequence[Effect]) -> tuple:
     """The place of one effect, the places of several."""
     return effects[0].at if len(effects) == 1 else tuple(effect.at for effect in effects)
+
+
+def families(effects: Sequence[Effect]) -> list[str]:
+    """Their families, in order."""
+    return sorted(effect.cause.family for effect in effects)

@@ -7,12 +7,14 @@ import numpy as np
 from ..identification import Unknown, prior
 from ..structures import AccelerationBias, AccelerationGain, ForceGain, Preload
 from ._adequacy import NEARLY_ALL, NEGLIGIBLE, SIGNIFICANT, adequate, almost_all, explained, unexplained
-from ._doubt import UNFIT, UNFIT_OF_WHITE, UNFIT_SHARE
+from ._doubt import UNFIT, UNFIT_OF_WHITE
 from ._lack_of_fit import Unfit
 from ._trial import Trial, ended, own_values
 
 WORTH_A_SECOND = 0.03
 """Share of the refit's error by which two effects must predict better than either of them alone."""
+_UNFIT_SHARE = 0.01
+"""Share of the nats that one effect gains from which those of other shapes beside it are worth a search."""
 
 
 def settled(trials: Sequence[Trial], refitted: Trial) -> bool:
@@ -37,7 +39,7 @@ def something_left(
         return False
     if best.prediction.left < NEGLIGIBLE:
         gained = best.evidence - refitted.evidence
-        least = UNFIT_OF_WHITE if adequate(best) else max(UNFIT_SHARE[2] * gained, UNFIT)
+        least = UNFIT_OF_WHITE if adequate(best) else max(_UNFIT_SHARE * gained, UNFIT)
         return bool(best.effects) and lack_of_fit(best).nats > least
     # One part of a decay may be too small to show the second effect: all parts tell together.
     much = np.sum(best.prediction.beyond) >= WORTH_A_SECOND**2 * np.sum(refitted.prediction.error)

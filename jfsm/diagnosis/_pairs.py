@@ -5,8 +5,8 @@ from itertools import combinations
 from typing import NamedTuple
 
 from ..identification import Nuisances
-from ..structures import AbstractSensor, AbstractTerm, CubicStiffness, QuadraticStiffness, Structure
-from ._candidates import SHAPES, Candidate, Laws, natural_starts, values_found
+from ..structures import AbstractSensor, AbstractTerm, CubicStiffness, Preload, QuadraticStiffness, Structure
+from ._candidates import SHAPES, Candidate, Laws, natural_starts, other_delay, values_found
 from ._effect import Effect
 from ._trial import Trial
 
@@ -78,6 +78,9 @@ def instead(pair: Trial, effects: Sequence[Effect], model: Structure, nuisances:
         beside = _beside(pair, rest, kept, effects, model, nuisances)
         if pair.effects[changed].cause.is_sensor:
             found += [one.candidate for one in beside if one.left is None]
+        effect, part, own = pair.effects[kept], pair.parts[kept], values_found(model, pair.structure)
+        for other, late in other_delay(pair.parts[changed], effects):
+            found.append(Candidate(_ordered(effect, other), (_both(model, effect, part, other, late),), own=own))
         found += [one.candidate for one in _best(beside, _INSTEAD)]
     return [c for c in found if set(c.effects) != set(pair.effects)]
 
@@ -95,21 +98,35 @@ def _beside(
     effect, part = base.effects[kept], base.parts[kept]
     laws, others = Laws(structure, nuisances), [part] if isinstance(part, AbstractTerm) else []
     own = values_found(model, structure)
-    found = []
+    found: list[_Pair] = []
     for other in effects:
         if not _are_two(effect, other):
             continue
         if other.cause.is_sensor:
             starts, left = natural_starts(model + part, *other, nuisances), None
+        elif constant := _instead_of_an_offset(base, other):
+            law, offset = constant
+            both = _both(model, effect, part, other, law)
+            found.append(_Pair(Candidate(_ordered(effect, other), (both,), own=own | offset), None))
+            continue
         else:
             placed = laws.placed(other, others)[:SHAPES]
             starts = tuple(_both(model, effect, part, other, start.term) for start in placed)
             left = placed[0].left if placed and placed[0].share is not None else None
         if starts:
-            in_order = (effect, other) if _in_order(effect, other) else (other, effect)
             # A gain lies on a ridge with the own values: it begins at those as given, and at their end of it.
-            found.append(_Pair(Candidate(in_order, starts, own=None if other.cause.is_sensor else own), left))
+            candidate = Candidate(_ordered(effect, other), starts, own=None if other.cause.is_sensor else own)
+            found.append(_Pair(candidate, left))
     return found
+
+
+def _instead_of_an_offset(base: Trial, other: Effect) -> tuple[AbstractTerm, dict[str, float]] | None:
+    """A constant force on a mass that takes over what the offset of its force sensor is beside `base`."""
+    path = f"offset@force-{other.at[1]}.b"
+    constant = base.structure.values().get(path, 0.0)
+    if other.cause.effect is not Preload or other.at[0] != 0 or constant == 0:
+        return None
+    return Preload(-constant, at=other.at), {path: 0.0}
 
 
 def _are_two(one: Effect, other: Effect) -> bool:
@@ -125,7 +142,15 @@ def _in_order(one: Effect, other: Effect) -> bool:
     return (one.cause.family, one.cause.id, one.at) <= (other.cause.family, other.cause.id, other.at)
 
 
+def _ordered(one: Effect, other: Effect) -> tuple[Effect, Effect]:
+    return (one, other) if _in_order(one, other) else (other, one)
+
+
 def _both(
-    model: Structure, one: Effect, part: AbstractTerm | AbstractSensor, other: Effect, law: AbstractTerm
+    model: Structure,
+    one: Effect,
+    part: AbstractTerm | AbstractSensor,
+    other: Effect,
+    law: AbstractTerm | AbstractSensor,
 ) -> Structure:
     return model + part + law if _in_order(one, other) else model + law + part

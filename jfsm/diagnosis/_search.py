@@ -12,7 +12,7 @@ from ..identification import LADDER, LANES, Maximum, Nuisances, Posterior, appro
 from ..structures import Structure
 from ._adequacy import GATE, SIGNIFICANT, explained
 from ._candidates import Candidate, hypothesis, late_instead, resting, special_cases, values_found
-from ._effect import Effect
+from ._effect import Effect, families
 from ._enough import is_itself
 from ._pairs import instead, pairs
 from ._trial import Trial, trial
@@ -29,18 +29,23 @@ are worth, a few steps may not show."""
 
 
 class _Way(NamedTuple):
-    """Rungs of a climb, and how many lots go on after an early one: so many at least, and such a share of them."""
+    """Rungs of a climb, and how many lots go on after an early one: so many at least, and such a share of them.
+
+    Those that are kept go on after every early rung, and `to_the_end` past the last one, too.
+    """
 
     ladder: tuple[float, ...]
     least: int
     share: float
+    to_the_end: bool = False
 
 
 _ALONE = _Way((0.3, 0.03, 0.01), 10, 0.5)
 """Of single effects: the refit has been at the top already."""
 _TOGETHER = _Way((0.03, 0.01), 6, 0.25)
 """Of pairs: one of the two has been fitted already."""
-
+_INSTEAD = _TOGETHER._replace(to_the_end=True)
+"""Of those that share an effect with the best pair."""
 
 _FROM_THERE = _Way(LADDER[-1:], 1, 1.0)
 """From numbers of what is akin."""
@@ -78,6 +83,7 @@ class _Lot:
             for i in range(0, len(starts), lanes)
         ]
         self.label = " beside ".join(effect.label for effect in candidates[0].effects)
+        self.families = families(candidates[0].effects)
         self.share = max(math.inf if candidate.share is None else candidate.share for candidate in candidates)
         self.program, self.behind = posteriors[0].program, 0.0
         self.climb = self._climb(posteriors, candidates, lanes, ladder)
@@ -206,7 +212,8 @@ def search_akin(
     """
     tried = [c for t in close for law in t.laws for c in special_cases(t.structure, law, every, model)]
     tried += [c for t in close for law in t.laws for c in resting(t.structure, law, every, model, records[0])]
-    tried += [c for t in close for part in t.parts for c in late_instead(t.structure, part, every, model)]
+    effects = [effect for c in every for effect in c.effects]
+    tried += [c for t in close for part in t.parts for c in late_instead(t.structure, part, effects, model)]
     if not tried:
         return known
     lots = [_Lot(beginnings, model, records, until, _FROM_THERE.ladder) for beginnings in groups(tried, None)]
@@ -228,19 +235,24 @@ def search_pairs(
     """Pairs of good single causes fitted, then those that share one with the best pair."""
     best = min([refitted, *singles], key=lambda t: t.value)
 
-    def climbed(tried: Sequence[Candidate]) -> Found:
-        lots = [_Lot(beginnings, model, records, until, _TOGETHER.ladder) for beginnings in groups(tried, None)]
-        return _climbed(lots, _TOGETHER, [], best, tell)
+    def climbed(tried: Sequence[Candidate], way: _Way, kept: list[str] | None = None) -> Found:
+        lots = [_Lot(beginnings, model, records, until, way.ladder) for beginnings in groups(tried, None)]
+        return _climbed(lots, way, [lot for lot in lots if lot.families == kept], best, tell)
 
-    first = climbed(pairs(singles, effects, model, records[0]))
+    first = climbed(pairs(singles, effects, model, records[0]), _TOGETHER)
     named = [t for t in first.trials if is_itself(t)]
     leader = max(named, key=lambda t: t.evidence, default=best)
     if explained(leader, best) < GATE and leader.evidence - best.evidence < SIGNIFICANT:
         return first
-    done = {one.effects for one in (*first.trials, *first.behind)}
-    near = instead(leader, effects, model, records[0])
-    then = climbed([c for c in near if c.effects not in done])
-    return Found(first.trials + then.trials, first.behind + then.behind)
+    done = {t.effects for t in first.trials}
+    # From the leader's numbers some may arrive that were left behind from elsewhere. Those of its own families are seen
+    # off at their tops only: laws alike tell apart late.
+    near = [c for c in instead(leader, effects, model, records[0]) if c.effects not in done]
+    then = climbed(near, _INSTEAD, kept=families(leader.effects))
+    trials = first.trials + then.trials
+    done = {t.effects for t in trials}
+    behind = {one.effects: one for one in (*first.behind, *then.behind) if one.effects not in done}
+    return Found(trials, list(behind.values()))
 
 
 def _climbed(
@@ -255,7 +267,8 @@ def _climbed(
         near = _near(pursued, max(way.least, int(way.share * len(pursued))))
         pursued = [lot for lot in pursued if lot in near or lot in kept]
         list(side_by_side(_Lot.step, pursued))
-    pursued = _near(pursued, _ALWAYS_PURSUED, best.rung)
+    near = _near(pursued, _ALWAYS_PURSUED, best.rung)
+    pursued = [lot for lot in pursued if lot in near or (way.to_the_end and lot in kept)]
 
     def finished(lot: _Lot) -> list[Trial]:
         return list(lot.trials(finish(lot.posterior, lot.rung, best=leader)))
