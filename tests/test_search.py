@@ -1,6 +1,8 @@
 """The fits behind a diagnosis: how hypotheses are followed to their tops."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from scipy.integrate import solve_ivp
 import jfsm
 from jfsm.diagnosis._candidates import Candidate, candidates, chosen_causes, late_instead, special_cases
 from jfsm.diagnosis._effect import Effect
+from jfsm.diagnosis._pairs import instead, pairs
 from jfsm.diagnosis._search import Found, LeftBehind, fit_model, refit_from, search, search_akin
 from jfsm.identification import prepare
 from jfsm.structures import Coulomb, Stribeck, causes
@@ -96,3 +99,31 @@ def test_a_refit_that_stopped_on_its_way_is_climbed_again_from_own_values_found_
     better = replace(refitted, evidence=refitted.evidence + 17.0)
     assert refit_from([beside], better, MODEL, *with_friction) is better
     assert refit_from([], stopped, MODEL, *with_friction) is stopped
+
+
+def found_beside_friction(*parts: Any, cause: str) -> Any:
+    """A trial of Coulomb friction beside an effect, whose parts its structure has with the offset of a force."""
+    friction, known = jfsm.Coulomb(0.8, at=(0, 1)), causes()
+    structure = MODEL + friction + jfsm.Offset(0.3, at=("force", 1))
+    for part in parts:
+        structure = structure + part
+    effects = (Effect(known["coulomb"], (0, 1)), *(Effect(known[cause], part.at) for part in parts))
+    return SimpleNamespace(effects=effects, parts=(friction, *parts), structure=structure, evidence=0.0)
+
+
+def test_a_constant_force_beside_another_effect_begins_as_what_the_offset_of_the_force_is(with_friction):
+    base, preload = found_beside_friction(cause="coulomb"), Effect(causes()["preload"], (0, 1))
+    (pair,) = pairs([base], [preload], MODEL, with_friction[0][0])
+    assert {effect.cause.id for effect in pair.effects} == {"coulomb", "preload"}
+    assert pair.starts[0].values()["preload@0-1.F"] == -0.3  # a reading too large by 0.3 is a force the other way
+    assert pair.own is not None and pair.own["offset@force-1.b"] == 0.0
+
+
+def test_beside_another_effect_an_early_channel_is_a_late_other_one_too(with_friction):
+    early = jfsm.ForceDelay(-0.04, at=("force", 1))
+    late = Effect(causes()["channel_delay"], ("displacement", 1))
+    pair = found_beside_friction(early, cause="force_delay")
+    found = instead(pair, [*pair.effects, late], MODEL, with_friction[0][0])
+    starts = [start.values() for c in found for start in c.starts if late in c.effects]
+    assert 0.04 in [values["channel_delay@displacement-1.tau"] for values in starts]
+    assert all(values["coulomb@0-1.F"] == 0.8 for values in starts)
