@@ -179,6 +179,8 @@ def test_a_second_effect_that_predictions_do_not_tell_is_told_by_evidence(second
     single, pair = trial(8000.0, left, "coulomb"), trial(8000.0 + gained, left / 2, "coulomb", second)
     single.whiteness, pair.whiteness = whiteness, 0.02
     law = jfsm.Preload(1.0, at=(0, 1)) if second == "preload" else jfsm.CubicStiffness(1.0, at=(0, 1))
+    offset = Unknown("offset@force-1.b", 0.0, 1.0, False, 0.0, 0.2)
+    single.unknowns, single.theta = (offset,), np.array([1.0])
     single.laws, pair.laws = (jfsm.Coulomb(1.0, at=(0, 1)),), (jfsm.Coulomb(1.0, at=(0, 1)), law)
     for t in (single, pair):
         t.structure = SimpleNamespace(stiffness_of=lambda at: 1.0)

@@ -13,6 +13,8 @@ from ._trial import Trial, ended, own_values
 
 WORTH_A_SECOND = 0.03
 """Share of the refit's error by which two effects must predict better than either of them alone."""
+MAY_HIDE = (ForceGain, AccelerationGain, Preload, AccelerationBias)
+"""Effects that own values and offsets may stand for."""
 _UNFIT_SHARE = 0.01
 """Share of the nats that one effect gains from which those of other shapes beside it are worth a search."""
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..structures import Preload
 from ._adequacy import GATE, NEGLIGIBLE, SIGNIFICANT, adequate, explained, unexplained
-from ._enough import WORTH_A_SECOND, strain
+from ._enough import MAY_HIDE, WORTH_A_SECOND, hidden, strain
 from ._trial import Trial, ended, own_values
 
 _SECOND = 15.0
@@ -84,9 +84,12 @@ def _is_constant(t: Trial) -> bool:
     return bool(t.laws) and all(isinstance(law, Preload) for law in t.laws)
 
 
-def _hides_one(t: Trial) -> bool:
-    """Whether all but one of its effects may hide in own values and offsets: what is believed of these tells them."""
-    return sum(not isinstance(law, Preload) for law in t.laws) < 2
+def _hides(t: Trial, alone: Trial) -> bool:
+    """Whether what two effects have beside one alone may hide in own values and offsets of that: what is believed of
+    these tells them. Where one alone leaves something it is hard to believe that they hide it."""
+    kinds = MAY_HIDE if adequate(alone) else hidden([alone])
+    beside = [effect for effect in t.effects if effect not in alone.effects]
+    return alone.prediction.left < NEGLIGIBLE and len(beside) == 1 and beside[0].cause.effect in kinds
 
 
 def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
@@ -99,7 +102,7 @@ def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
     for alone in singles:
         if alone is not best and alone.effects[0] not in t.effects:
             continue
-        hides = _hides_one(t) and alone.prediction.left < NEGLIGIBLE
+        hides = _hides(t, alone)
         if adequate(t) and (hides or not np.any(unexplained(alone))):  # predictions do not tell
             least = SIGNIFICANT if hides and adequate(alone) else _SECOND
             if t.evidence - alone.evidence <= least:
