@@ -2,12 +2,13 @@
 
 It is one that nine of ten records, alike but for their noise, let pass each of two hurdles of a verdict:
 
-* its evidence beats that of the refit and that of the model as given by what is significant. An effect that is f times
-  as large as in some structure moves the readings by f√J standard deviations more than what is refitted can follow, and
-  gains half the square of so many nats; chance adds a normal deviate before the square is taken. Its numbers cost what
-  they cost in Laplace's evidence: Σ z²/2 + ln |1 + W S W| / 2, z and W being where they stand and how wide they are
-  believed to be beforehand, S the information that the readings hold on them. Own values are free beside an effect; the
-  model as given, where they are not, is ahead of the refit by what they cost, and follows less.
+* its evidence beats that of the refit and that of the model as given by what is significant of one law among many. An
+  effect that is f times as large as in some structure moves the readings by f√J standard deviations more than what is
+  refitted can follow, and gains half the square of so many nats; chance adds a normal deviate before the square is
+  taken. Its numbers cost what they cost in Laplace's evidence: Σ z²/2 + ln |1 + W S W| / 2, z and W being where they
+  stand and how wide they are believed to be beforehand, S the information that the readings hold on them. Own values
+  are free beside an effect; the model as given, where they are not, is ahead of the refit by what they cost, and
+  follows less.
 * without it the model as given predicts noticeably worse than noise lets it.
 
 Eight of ten or more then pass both. Silence is worth something only if an effect of the stated size seldom keeps
@@ -25,10 +26,11 @@ import numpy as np
 
 from .._threads import compiled_once, side_by_side
 from ..identification import Nuisances, Posterior, prior
-from ..structures import Structure
+from ..structures import Preload, Structure
 from ._adequacy import NOTICEABLE, SIGNIFICANT
 from ._candidates import Candidate, hypothesis, modest
 from ._effect import Effect
+from ._standing import UNPREDICTED
 from ._trial import SLACKS, Trial, ended, extent, sets, windows
 
 _SPARED = 1.28
@@ -165,11 +167,13 @@ class _Seen:
             far = (theta[mine] + grows * math.log(factor) - center) / width
             return 0.5 * float(np.sum(far**2) + np.sum(np.log1p(factor**2 * scaled)))
 
-        # Own values may make up for a sensor's fault: it has to be likelier than they are, by no margin.
-        margin = 0.0 if all(effect.cause.is_sensor for effect in self.effects) else SIGNIFICANT
+        [effect] = self.effects
+        # Own values may make up for a sensor's fault: it has to be likelier than they are, by no margin. A law may have
+        # to beat a refit that leaves nothing.
+        least = SIGNIFICANT if effect.cause.is_sensor or effect.cause.effect is Preload else UNPREDICTED
         return max(
-            _significant(beside_refit[np.ix_(grows, grows)], margin, cost),
-            _significant(beside_given[np.ix_(grows, grows)], SIGNIFICANT + self.silence.spared, cost),
+            _significant(beside_refit[np.ix_(grows, grows)], 0.0 if effect.cause.is_sensor else least, cost),
+            _significant(beside_given[np.ix_(grows, grows)], least + self.silence.spared, cost),
             _noticeable(self.posterior, theta, self.grown(theta, -_GONE), self.silence.given),
         )
 

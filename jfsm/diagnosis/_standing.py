@@ -12,7 +12,7 @@ from ._trial import Trial, ended, own_values
 
 _SECOND = 15.0
 """Nats by which two effects must beat either of them alone."""
-_UNPREDICTED = 15.0
+UNPREDICTED = 15.0
 """Nats by which a cause must beat a refit whose predictions leave nothing: of many, one gains some by chance."""
 _UNSEEN = 0.1
 """Nats by which a law must beat a special case of it for its further numbers to be seen."""
@@ -67,11 +67,11 @@ def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
         return f"no more probable than the model {'as given' if same else 'refitted'}"
     # What shows over the whole record an unknown state may make up for over some periods, and these do not tell then.
     unpredicted = not np.any(unexplained(refitted))
-    if unpredicted and better <= _UNPREDICTED and t.laws and not _is_constant(t):
+    if unpredicted and better <= UNPREDICTED and t.laws and not _is_constant(t):
         return "hardly more probable than the model refitted, which leaves nothing to explain"
     if over_refit >= GATE or (adequate(t) and over_given >= GATE):
         return ""
-    if unpredicted and better > _UNPREDICTED and adequate(t) and (_is_constant(t) or not adequate(refitted)):
+    if unpredicted and better > UNPREDICTED and adequate(t) and (_is_constant(t) or not adequate(refitted)):
         return ""
     return f"explains {max(over_refit, 0.0):.0%} of what a refit leaves, less than half"
 
