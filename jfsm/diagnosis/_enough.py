@@ -15,8 +15,6 @@ WORTH_A_SECOND = 0.03
 """Share of the refit's error by which two effects must predict better than either of them alone."""
 MAY_HIDE = (ForceGain, AccelerationGain, Preload, AccelerationBias)
 """Effects that own values and offsets may stand for."""
-_UNFIT_SHARE = 0.01
-"""Share of the nats that one effect gains from which those of other shapes beside it are worth a search."""
 
 
 def settled(trials: Sequence[Trial], refitted: Trial) -> bool:
@@ -37,15 +35,13 @@ def something_left(
 ) -> bool:
     """Whether the best of them leaves enough for a second effect to be worth a search: what a pair has to gain."""
     best = max(trials, key=lambda t: t.evidence)
-    if imposed and almost_all(best, refitted):
+    if (imposed and almost_all(best, refitted)) or (not best.effects and best.prediction.left < NEGLIGIBLE):
         return False
-    if best.prediction.left < NEGLIGIBLE:
-        gained = best.evidence - refitted.evidence
-        least = UNFIT_OF_WHITE if adequate(best) else max(_UNFIT_SHARE * gained, UNFIT)
-        return bool(best.effects) and lack_of_fit(best).nats > least
+    if best.effects and lack_of_fit(best).nats > (UNFIT_OF_WHITE if adequate(best) else UNFIT):
+        return True
     # One part of a decay may be too small to show the second effect: all parts tell together.
     much = np.sum(best.prediction.beyond) >= WORTH_A_SECOND**2 * np.sum(refitted.prediction.error)
-    return bool(much and np.any(unexplained(best)))
+    return bool(much and not adequate(best) and np.any(unexplained(best)))
 
 
 def hidden(trials: Sequence[Trial]) -> tuple[type, ...]:
