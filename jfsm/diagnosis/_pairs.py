@@ -5,7 +5,15 @@ from itertools import combinations
 from typing import NamedTuple
 
 from ..identification import Nuisances
-from ..structures import AbstractSensor, AbstractTerm, CubicStiffness, Preload, QuadraticStiffness, Structure
+from ..structures import (
+    AbstractSensor,
+    AbstractTerm,
+    AccelerationBias,
+    CubicStiffness,
+    Preload,
+    QuadraticStiffness,
+    Structure,
+)
 from ._candidates import SHAPES, Candidate, Laws, natural_starts, other_delay, values_found
 from ._effect import Effect
 from ._trial import Trial
@@ -102,13 +110,13 @@ def _beside(
     for other in effects:
         if not _are_two(effect, other):
             continue
-        if other.cause.is_sensor:
-            starts, left = natural_starts(model + part, *other, nuisances), None
-        elif constant := _instead_of_an_offset(base, other):
+        if constant := _instead_of_an_offset(base, other):
             law, offset = constant
             both = _both(model, effect, part, other, law)
             found.append(_Pair(Candidate(_ordered(effect, other), (both,), own=own | offset), None))
             continue
+        if other.cause.is_sensor:
+            starts, left = natural_starts(model + part, *other, nuisances), None
         else:
             placed = laws.placed(other, others)[:SHAPES]
             starts = tuple(_both(model, effect, part, other, start.term) for start in placed)
@@ -120,13 +128,15 @@ def _beside(
     return found
 
 
-def _instead_of_an_offset(base: Trial, other: Effect) -> tuple[AbstractTerm, dict[str, float]] | None:
-    """A constant force on a mass that takes over what the offset of its force sensor is beside `base`."""
-    path = f"offset@force-{other.at[1]}.b"
-    constant = base.structure.values().get(path, 0.0)
-    if other.cause.effect is not Preload or other.at[0] != 0 or constant == 0:
+def _instead_of_an_offset(base: Trial, other: Effect) -> tuple[AbstractTerm | AbstractSensor, dict[str, float]] | None:
+    """A constant force on a mass, or a bias, that takes over what the offset of its sensor is beside `base`."""
+    kind, (first, j) = other.cause.effect, other.at
+    channel, sign = {Preload: ("force", -1), AccelerationBias: ("acceleration", 1)}.get(kind, ("", 0))
+    path = f"offset@{channel}-{j}.b"
+    offset = base.structure.values().get(path, 0.0)
+    if offset == 0 or (kind is Preload and first != 0):
         return None
-    return Preload(-constant, at=other.at), {path: 0.0}
+    return kind(sign * offset, at=other.at), {path: 0.0}
 
 
 def _are_two(one: Effect, other: Effect) -> bool:

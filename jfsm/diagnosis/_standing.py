@@ -12,6 +12,8 @@ from ._trial import Trial, ended, own_values
 
 _SECOND = 15.0
 """Nats by which two effects must beat either of them alone."""
+_WORTH_TO_NOISE = 0.01
+"""Share of the refit's error by which two effects that leave noise only must predict better than either alone."""
 UNPREDICTED = 15.0
 """Nats by which a cause must beat a refit whose predictions leave nothing: of many, one gains some by chance."""
 _UNSEEN = 0.1
@@ -109,7 +111,8 @@ def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
                 return f"{alone.effects[0].label} alone is about as probable"
             continue
         gained = _size(alone.prediction.excess) - _size(t.prediction.excess)
-        enough = explained(t, alone) >= GATE and gained >= WORTH_A_SECOND * size
+        worth = _WORTH_TO_NOISE if adequate(t) else WORTH_A_SECOND
+        enough = explained(t, alone) >= GATE and gained >= worth * size
         if not enough or t.evidence - alone.evidence <= _SECOND:
             return f"{alone.effects[0].label} alone explains it about as well"
     return ""
