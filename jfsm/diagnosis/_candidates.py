@@ -26,6 +26,7 @@ from ..identification import (
     place,
     place_together,
     scale_of,
+    with_a_rest,
     with_offsets,
 )
 from ..structures import (
@@ -199,13 +200,10 @@ def resting(
         effect = c.effects[0]
         if len(c.effects) > 1 or effect.at != law.at or effect.cause.is_sensor:
             continue
-        kind, curvature = effect.cause.effect, float(law.k2)
-        numbers = kind.about_a_rest(stiffness, softer - stiffness, curvature)
-        if numbers is None:
-            continue
-        term = kind(**numbers, at=law.at)
-        rest = max(term.rests(stiffness), key=lambda rest: rest * curvature)
-        cases[c.effects] = replace(c, starts=(model + term,), own=own | _begin(law.at, rest))
+        placed = with_a_rest(effect.cause.effect, law.at, stiffness, softer - stiffness, float(law.k2))
+        if placed is not None:
+            term, rest = placed
+            cases[c.effects] = replace(c, starts=(model + term,), own=own | _begin(law.at, rest))
     return list(cases.values())
 
 

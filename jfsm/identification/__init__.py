@@ -24,6 +24,7 @@ from ._starts import missing_force as missing_force
 from ._starts import place as place
 from ._starts import scale_of as scale_of
 from ._starts import starts as starts
+from ._starts import with_a_rest as with_a_rest
 from ._together import PlacedTogether as PlacedTogether
 from ._together import place_together as place_together
 from ._unknowns import DEGREES as DEGREES

@@ -352,13 +352,22 @@ def about_a_rest(
     sizes = np.linalg.lstsq(columns, missing, rcond=None)[0]
     slope, curvature = sizes[2] / np.std(d), sizes[3] / np.var(d)
     stiffness = structure.stiffness_of(at)
+    found = with_a_rest(kind, at, stiffness, slope, curvature)
+    if found is None:
+        return None
+    term, rest = found
+    before, left = (float(np.mean((missing - columns[:, : len(q)] @ q) ** 2)) for q in (straight, sizes))
+    return Placed(term, 1.0 - left / before, left), rest
+
+
+def with_a_rest(
+    kind: type[AbstractTerm], at: tuple[int, int], stiffness: float, slope: float, curvature: float
+) -> tuple[AbstractTerm, float] | None:
+    """A term with such a slope and curvature about a rest of its own, and where that is; None if it has none."""
     numbers = kind.about_a_rest(stiffness, slope, curvature)
     term = None if numbers is None else kind(**numbers, at=at)
     rests = () if term is None else term.rests(stiffness)
-    if term is None or not rests:
-        return None
-    before, left = (float(np.mean((missing - columns[:, : len(q)] @ q) ** 2)) for q in (straight, sizes))
-    return Placed(term, 1.0 - left / before, left), max(rests, key=lambda rest: rest * curvature)
+    return (term, max(rests, key=lambda rest: rest * curvature)) if term is not None and rests else None
 
 
 def one_sign(kind: type[AbstractTerm]) -> bool:
