@@ -9,7 +9,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jfsm
-from jfsm.diagnosis._candidates import Candidate, candidates, chosen_causes, late_instead, special_cases
+from jfsm.diagnosis._begin import Start, begun
+from jfsm.diagnosis._candidates import Candidate, candidates, chosen_causes, hypothesis, late_instead, special_cases
 from jfsm.diagnosis._effect import Effect
 from jfsm.diagnosis._pairs import instead, pairs
 from jfsm.diagnosis._search import Found, LeftBehind, fit_model, refit_from, search, search_akin
@@ -20,13 +21,13 @@ MODEL = jfsm.Structure.sdof(1.0, 9.0, 0.3)
 
 
 def test_a_special_case_begins_from_the_numbers_of_the_law_that_holds_it():
-    found = MODEL.with_values({"stiffness@0-1.k": 8.0}) + Stribeck(2.0, 2.5, 0.1, at=(0, 1))
+    begin = {("stiffness@0-1.k", None): Start(8.0, 9.0)}
     coulomb = Candidate((Effect(causes()["coulomb"], (0, 1)),), (MODEL + Coulomb(0.3, at=(0, 1)),))
     spring = Candidate((Effect(causes()["cubic_hardening"], (0, 1)),), (MODEL + jfsm.CubicStiffness(1.0, at=(0, 1)),))
-    (case,) = special_cases(found, found.terms[-1], [coulomb, spring], MODEL)
+    (case,) = special_cases(Stribeck(2.0, 2.5, 0.1, at=(0, 1)), begin, [coulomb, spring])
     assert case.effects == coulomb.effects
     assert case.starts[0].values() == MODEL.values() | {"coulomb@0-1.F": 2.0}
-    assert case.own == MODEL.values() | {"stiffness@0-1.k": 8.0}
+    assert case.begin is begin
 
 
 def test_an_early_channel_is_a_late_other_one():
@@ -37,14 +38,14 @@ def test_an_early_channel_is_a_late_other_one():
 
     force, channel = delay("force_delay", ("force", 1)), delay("channel_delay", ("displacement", 1))
     early = jfsm.ForceDelay(-0.04, at=("force", 1))
-    found = MODEL.with_values({"stiffness@0-1.k": 8.0}) + early
-    (late,) = late_instead(found, early, [force, channel], MODEL)
+    begin = {("stiffness@0-1.k", None): Start(8.0, 9.0)}
+    (late,) = late_instead(early, begin, [force, channel], MODEL)
     assert late.effects == (channel,)
     assert late.starts[0].values() == MODEL.values() | {"channel_delay@displacement-1.tau": 0.04}
-    assert late.own == MODEL.values() | {"stiffness@0-1.k": 8.0}
-    assert late_instead(found, jfsm.ForceDelay(0.04, at=("force", 1)), [force, channel], MODEL) == []
+    assert late.begin is begin
+    assert late_instead(jfsm.ForceDelay(0.04, at=("force", 1)), begin, [force, channel], MODEL) == []
     other = delay("channel_delay", ("acceleration", 1))
-    assert late_instead(found, early, [force, channel, other], MODEL) == []
+    assert late_instead(early, begin, [force, channel, other], MODEL) == []
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +92,8 @@ def test_a_special_case_that_stopped_on_its_way_is_fitted_from_the_law_that_hold
 
 def test_a_refit_that_stopped_on_its_way_is_climbed_again_from_own_values_found_beside_an_effect(with_friction, fitted):
     _, refitted = fitted
-    beside = replace(refitted, structure=refitted.structure.with_values({"stiffness@0-1.k": 8.9}))
+    (stiffness,) = (i for i, u in enumerate(refitted.unknowns) if u.path == "stiffness@0-1.k")
+    beside = replace(refitted, theta=np.where(np.arange(refitted.theta.size) == stiffness, np.log(8.9 / 9.0), 0.0))
     stopped = replace(refitted, evidence=refitted.evidence - 17.0)
     again = refit_from([beside], stopped, MODEL, *with_friction)
     assert again.label == "refitted" and again.effects == ()
@@ -101,28 +103,57 @@ def test_a_refit_that_stopped_on_its_way_is_climbed_again_from_own_values_found_
     assert refit_from([], stopped, MODEL, *with_friction) is stopped
 
 
-def found_beside_friction(*parts: Any, cause: str) -> Any:
-    """A trial of Coulomb friction beside an effect, whose parts its structure has with the offset of a force."""
+def found_beside_friction(records: Any, *parts: Any, cause: str) -> Any:
+    """A trial of Coulomb friction beside an effect, whose parts its structure has with the offset of a force.
+
+    All its numbers ended off where they are believed to be.
+    """
     friction, known = jfsm.Coulomb(0.8, at=(0, 1)), causes()
-    structure = MODEL + friction + jfsm.Offset(0.3, at=("force", 1))
+    structure = MODEL + friction
     for part in parts:
         structure = structure + part
     effects = (Effect(known["coulomb"], (0, 1)), *(Effect(known[cause], part.at) for part in parts))
-    return SimpleNamespace(effects=effects, parts=(friction, *parts), structure=structure, evidence=0.0)
+    (unknowns,) = hypothesis(MODEL, [structure], records).unknowns
+    theta, found = np.full(len(unknowns), 0.07), structure + jfsm.Offset(0.3, at=("force", 1))
+    return SimpleNamespace(
+        effects=effects, parts=(friction, *parts), structure=found, unknowns=unknowns, theta=theta, evidence=0.0
+    )
+
+
+def test_what_is_tried_beside_an_effect_begins_where_that_left_all_other_numbers(with_friction):
+    records, _ = with_friction
+    base, spring = found_beside_friction(records, cause="coulomb"), Effect(causes()["cubic_hardening"], (0, 1))
+    (pair,) = pairs([base], [spring], MODEL, records[0])
+    (unknowns,) = hypothesis(MODEL, pair.starts[:1], records, begins=[pair.begin]).unknowns
+    others = {u.path: u for u in unknowns if not u.path.startswith(("coulomb", "cubic"))}
+    assert {"stiffness@0-1.k", "offset@force-1.b", "offset@displacement-1.b", "noise@0"} < others.keys()
+    np.testing.assert_allclose([u.theta for u in others.values()], 0.07)
+    assert [u.center for u in others.values()] == [u.center for u in base.unknowns if u.path in others]
+
+
+def test_a_number_begins_where_it_is_said_to_and_is_believed_there(with_friction):
+    records, _ = with_friction
+    (refit,) = hypothesis(MODEL, [MODEL], records).unknowns
+    (offset,) = (u for u in refit if u.path == "offset@displacement-1.b")
+    of_all = {("offset@displacement-1.b", None): Start(5.0, 4.0)}
+    moved = begun(offset, of_all)
+    assert moved.value(moved.theta) == pytest.approx(5.0) and moved.value(moved.center) == pytest.approx(4.0)
+    mine = begun(offset, of_all | {("offset@displacement-1.b", 0): Start(1.0, 2.0)})
+    assert mine.value(mine.theta) == pytest.approx(1.0) and mine.value(mine.center) == pytest.approx(2.0)
+    assert begun(offset, {("x0@1", None): Start(1.0, 2.0)}) is offset and begun(offset, None) is offset
 
 
 def test_a_constant_force_beside_another_effect_begins_as_what_the_offset_of_the_force_is(with_friction):
-    base, preload = found_beside_friction(cause="coulomb"), Effect(causes()["preload"], (0, 1))
+    base, preload = found_beside_friction(with_friction[0], cause="coulomb"), Effect(causes()["preload"], (0, 1))
     (pair,) = pairs([base], [preload], MODEL, with_friction[0][0])
     assert {effect.cause.id for effect in pair.effects} == {"coulomb", "preload"}
     assert pair.starts[0].values()["preload@0-1.F"] == -0.3  # a reading too large by 0.3 is a force the other way
-    assert pair.own is not None and pair.own["offset@force-1.b"] == 0.0
 
 
 def test_beside_another_effect_an_early_channel_is_a_late_other_one_too(with_friction):
     early = jfsm.ForceDelay(-0.04, at=("force", 1))
     late = Effect(causes()["channel_delay"], ("displacement", 1))
-    pair = found_beside_friction(early, cause="force_delay")
+    pair = found_beside_friction(with_friction[0], early, cause="force_delay")
     found = instead(pair, [*pair.effects, late], MODEL, with_friction[0][0])
     starts = [start.values() for c in found for start in c.starts if late in c.effects]
     assert 0.04 in [values["channel_delay@displacement-1.tau"] for values in starts]

@@ -46,6 +46,7 @@ from ..structures import (
     Structure,
     causes,
 )
+from ._begin import Begin, Start, begun, own_part
 from ._effect import Effect
 
 _START, _START_AT_PEAK = 0.1, 0.3
@@ -74,14 +75,14 @@ class Candidate:
     """A cause at a place, or several at theirs; `starts` are the structures that a fit begins from.
 
     `share` is how much of the missing force the best of them explains by regression; None where regression cannot tell,
-    as of sensors, which lack no force. A law that no shape of which explains any has no starts. `own` holds the model's
-    own values to begin with, where they are not tried as given, and where the motion begins if that is known.
+    as of sensors, which lack no force. A law that no shape of which explains any has no starts. `begin` is where a fit
+    begins otherwise, where that is not as given.
     """
 
     effects: tuple[Effect, ...]
     starts: tuple[Structure, ...]
     share: float | None = None
-    own: Mapping[str, float] | None = None
+    begin: Begin | None = None
 
 
 def chosen_causes(selection: Sequence[str | Cause] | None) -> dict[str, Cause]:
@@ -155,27 +156,23 @@ def contained(laws: Sequence[AbstractTerm], among: Sequence[Candidate]) -> list[
     return [c for c in alone if (c.effects[0].at, c.effects[0].cause.effect) in found]
 
 
-def special_cases(found: Structure, law: AbstractTerm, among: Sequence[Candidate], model: Structure) -> list[Candidate]:
-    """What a law that was found is for certain of its numbers, beginning from the numbers and own values found."""
-    own, numbers = values_found(model, found), dict(zip(_names(law), law.values, strict=True))
-    cases = []
+def special_cases(law: AbstractTerm, begin: Begin, among: Sequence[Candidate]) -> list[Candidate]:
+    """What a law that was found is for certain of its numbers, which begins from these."""
+    numbers, cases = dict(zip(_names(law), law.values, strict=True)), []
     for c in contained([law], among):
         start = c.starts[0]
         placed = start.terms[-1]
         special = {name: numbers.get(name, value) for name, value in zip(_names(placed), placed.values, strict=True)}
         start = start.without(placed) + type(placed)(**special, at=placed.at)
-        cases.append(replace(c, starts=(start,), own=own))
+        cases.append(replace(c, starts=(start,), begin=begin))
     return cases
 
 
 def late_instead(
-    found: Structure, early: AbstractTerm | AbstractSensor, effects: Sequence[Effect], model: Structure
+    early: AbstractTerm | AbstractSensor, begin: Begin, effects: Sequence[Effect], model: Structure
 ) -> list[Candidate]:
     """The delay of the other one of two channels, of which one was found to be early."""
-    return [
-        Candidate((effect,), (model + late,), own=values_found(model, found))
-        for effect, late in other_delay(early, effects)
-    ]
+    return [Candidate((effect,), (model + late,), begin=begin) for effect, late in other_delay(early, effects)]
 
 
 def other_delay(early: AbstractTerm | AbstractSensor, effects: Sequence[Effect]) -> list[tuple[Effect, AbstractSensor]]:
@@ -187,14 +184,19 @@ def other_delay(early: AbstractTerm | AbstractSensor, effects: Sequence[Effect])
 
 
 def resting(
-    found: Structure, law: AbstractTerm, among: Sequence[Candidate], model: Structure, nuisances: Nuisances
+    found: Structure,
+    law: AbstractTerm,
+    begin: Begin,
+    among: Sequence[Candidate],
+    model: Structure,
+    nuisances: Nuisances,
 ) -> list[Candidate]:
     """Laws with a rest of their own that are, about it, the quadratic spring that was found, where none tells where
     the motion is."""
     if not isinstance(law, QuadraticStiffness) or not _may_rest_anywhere(model, nuisances):
         return []
     stiffness, softer = model.stiffness_of(law.at), found.without(law).stiffness_of(law.at)
-    own = {path: value for path, value in values_found(model, found).items() if not path.startswith("stiffness@")}
+    own = {key: start for key, start in own_part(begin).items() if not key[0].startswith("stiffness@")}
     cases = {}
     for c in among:
         effect = c.effects[0]
@@ -203,7 +205,7 @@ def resting(
         placed = with_a_rest(effect.cause.effect, law.at, stiffness, softer - stiffness, float(law.k2))
         if placed is not None:
             term, rest = placed
-            cases[c.effects] = replace(c, starts=(model + term,), own=own | _begin(law.at, rest))
+            cases[c.effects] = replace(c, starts=(model + term,), begin=own | _at_rest(law.at, rest))
     return list(cases.values())
 
 
@@ -217,15 +219,10 @@ def _tells_where(nuisances: Nuisances) -> bool:
     return nuisances.path is not None or any(kind == "displacement" for kind, _ in nuisances.channels)
 
 
-def _begin(at: tuple, rest: float) -> dict[str, float]:
-    """Where the motion begins if the link at such a place is stretched by `rest`."""
-    return {"x0@1": rest if at == (0, 1) else -rest}
-
-
-def values_found(model: Structure, found: Structure) -> dict[str, float]:
-    """The model's own values as a structure that extends it has them."""
-    values = found.values()
-    return {path: values[path] for path in model.entries()}
+def _at_rest(at: tuple, rest: float) -> dict[tuple[str, int | None], Start]:
+    """Where motions begin, and are believed to, if the link at such a place is stretched by `rest`."""
+    x0 = rest if at == (0, 1) else -rest
+    return {("x0@1", None): Start(x0, x0)}
 
 
 def _names(law: AbstractTerm) -> list[str]:
@@ -282,7 +279,7 @@ class Laws:
         if found is None:
             return []
         placed, rest = found
-        return [Candidate((effect,), (self.structure + placed.term,), placed.share, _begin(effect.at, rest))]
+        return [Candidate((effect,), (self.structure + placed.term,), placed.share, _at_rest(effect.at, rest))]
 
 
 def _shows(effect: type, kind: str, records: Sequence[Nuisances]) -> bool:
@@ -320,11 +317,6 @@ def modest(candidate: Candidate, model: Structure, nuisances: Nuisances) -> Stru
     return model + cause.effect(**{name: size[name] * value for name, value in shape.items()}, at=at)
 
 
-def begun(start: Unknown, value: float) -> Unknown:
-    """The start of a motion, believed to be elsewhere."""
-    return replace(start, theta=value / start.unit, center=value / start.unit)
-
-
 def own_paths(model: Structure, records: Sequence[Nuisances]) -> tuple[str, ...]:
     """The model's own values that a refit may change.
 
@@ -345,11 +337,11 @@ def hypothesis(
     records: Sequence[Nuisances],
     *,
     refit: bool = True,
-    begins: Sequence[Mapping[str, float] | None] = (),
+    begins: Sequence[Begin | None] = (),
 ) -> Hypothesis:
     """Starts with their unknowns: the model's own values, the effect's numbers, and each record's nuisances.
 
-    `begins` holds the own values of each start, where they differ from the model's, and where the motion begins.
+    `begins` holds where each start begins otherwise, if it is not as given.
     """
     structures, unknowns = [], []
     trust = dict(model.trust)
@@ -359,14 +351,10 @@ def hypothesis(
         effect = [p for p, (what, _) in start.entries().items() if p not in given and what.free]
         structure = with_offsets(start, records)
         degrees = DEGREES_BESIDE if effect else DEGREES
-        mine: list[Unknown] = [own_unknown(structure, p, trust, degrees) for p in own]
-        if begin is not None:
-            stated = structure.values()
-            mine = [replace(u, theta=math.log(begin.get(u.path, stated[u.path]) / stated[u.path])) for u in mine]
+        mine: list[Unknown] = [begun(own_unknown(structure, p, trust, degrees), begin) for p in own]
         mine += [effect_unknown(structure, p, records[0]) for p in effect]
         for index, nuisances in enumerate(records):
-            theirs = nuisance_unknowns(structure, nuisances, index)
-            mine += [begun(u, begin[u.path]) if begin and u.path in begin else u for u in theirs]
+            mine += [begun(u, begin) for u in nuisance_unknowns(structure, nuisances, index)]
         structures.append(structure)
         unknowns.append(tuple(mine))
     return Hypothesis(tuple(structures), tuple(unknowns))

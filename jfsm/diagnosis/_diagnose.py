@@ -264,7 +264,7 @@ def _believed(
     if _outweighed(model, refitted.structure):
         # The noise of the force acts through the mass, and all hypotheses share one noise: that of the likelier mass.
         records = prepare_all(whole, model, reconstruction, weighed=refitted.structure)
-        given, refitted = fit_model(model, records, until, near=refitted.structure)
+        given, refitted = fit_model(model, records, until, near=refitted)
     return records, until, given, refitted
 
 

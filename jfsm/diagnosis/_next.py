@@ -22,7 +22,8 @@ from ..identification import LADDER, Nuisances, Posterior, approach, finish, lan
 from ..records import Record
 from ..structures import AbstractTerm, Structure
 from ._adequacy import SIGNIFICANT
-from ._candidates import hypothesis, values_found
+from ._begin import found_in, own_part
+from ._candidates import hypothesis
 from ._chance import noise_levels
 from ._gain import remeasured
 from ._trial import Trial
@@ -194,7 +195,7 @@ def _evidence(model: Structure, nuisances: Nuisances, rival: Trial) -> float:
         start = start + part
     lanes = lanes_of(start)
     records = [nuisances.resolving([start])]
-    own = values_found(model, rival.structure)
+    own = own_part(found_in(rival))
     posterior = Posterior(
         hypothesis(model, [start] * lanes, records, begins=[own] * lanes), records, [nuisances.samples]
     )

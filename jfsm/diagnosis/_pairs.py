@@ -14,7 +14,8 @@ from ..structures import (
     QuadraticStiffness,
     Structure,
 )
-from ._candidates import SHAPES, Candidate, Laws, natural_starts, other_delay, values_found
+from ._begin import found_in
+from ._candidates import SHAPES, Candidate, Laws, natural_starts, other_delay
 from ._effect import Effect
 from ._trial import Trial
 
@@ -86,9 +87,10 @@ def instead(pair: Trial, effects: Sequence[Effect], model: Structure, nuisances:
         beside = _beside(pair, rest, kept, effects, model, nuisances)
         if pair.effects[changed].cause.is_sensor:
             found += [one.candidate for one in beside if one.left is None]
-        effect, part, own = pair.effects[kept], pair.parts[kept], values_found(model, pair.structure)
+        effect, part = pair.effects[kept], pair.parts[kept]
         for other, late in other_delay(pair.parts[changed], effects):
-            found.append(Candidate(_ordered(effect, other), (_both(model, effect, part, other, late),), own=own))
+            starts = (_both(model, effect, part, other, late),)
+            found.append(Candidate(_ordered(effect, other), starts, begin=found_in(pair)))
         found += [one.candidate for one in _best(beside, _INSTEAD)]
     return [c for c in found if set(c.effects) != set(pair.effects)]
 
@@ -105,17 +107,15 @@ def _beside(
     """Pairs of one effect of a trial, which `structure` has, with every other."""
     effect, part = base.effects[kept], base.parts[kept]
     laws, others = Laws(structure, nuisances), [part] if isinstance(part, AbstractTerm) else []
-    own = values_found(model, structure)
+    begin = found_in(base)
     found: list[_Pair] = []
     for other in effects:
         if not _are_two(effect, other):
             continue
-        if constant := _instead_of_an_offset(base, other):
-            law, offset = constant
-            both = _both(model, effect, part, other, law)
-            found.append(_Pair(Candidate(_ordered(effect, other), (both,), own=own | offset), None))
-            continue
-        if other.cause.is_sensor:
+        constant = _instead_of_an_offset(base, other)
+        if constant is not None:
+            starts, left = (_both(model, effect, part, other, constant),), None
+        elif other.cause.is_sensor:
             starts, left = natural_starts(model + part, *other, nuisances), None
         else:
             placed = laws.placed(other, others)[:SHAPES]
@@ -123,20 +123,19 @@ def _beside(
             left = placed[0].left if placed and placed[0].share is not None else None
         if starts:
             # A gain lies on a ridge with the own values: it begins at those as given, and at their end of it.
-            candidate = Candidate(_ordered(effect, other), starts, own=None if other.cause.is_sensor else own)
-            found.append(_Pair(candidate, left))
+            there = None if other.cause.is_sensor and not constant else begin
+            found.append(_Pair(Candidate(_ordered(effect, other), starts, begin=there), left))
     return found
 
 
-def _instead_of_an_offset(base: Trial, other: Effect) -> tuple[AbstractTerm | AbstractSensor, dict[str, float]] | None:
+def _instead_of_an_offset(base: Trial, other: Effect) -> AbstractTerm | AbstractSensor | None:
     """A constant force on a mass, or a bias, that takes over what the offset of its sensor is beside `base`."""
     kind, (first, j) = other.cause.effect, other.at
     channel, sign = {Preload: ("force", -1), AccelerationBias: ("acceleration", 1)}.get(kind, ("", 0))
-    path = f"offset@{channel}-{j}.b"
-    offset = base.structure.values().get(path, 0.0)
+    offset = base.structure.values().get(f"offset@{channel}-{j}.b", 0.0)
     if offset == 0 or (kind is Preload and first != 0):
         return None
-    return kind(sign * offset, at=other.at), {path: 0.0}
+    return kind(sign * offset, at=other.at)
 
 
 def _are_two(one: Effect, other: Effect) -> bool:

@@ -1,7 +1,7 @@
 """Every hypothesis fitted: those that share a program side by side, the hopeless ones only so far."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -11,7 +11,8 @@ from .._threads import compiled_once, side_by_side
 from ..identification import LADDER, LANES, Maximum, Nuisances, Posterior, approach, finish, lanes_of, rungs
 from ..structures import Structure
 from ._adequacy import GATE, SIGNIFICANT, explained
-from ._candidates import Candidate, hypothesis, late_instead, resting, special_cases, values_found
+from ._begin import Begin, found_in, own_part
+from ._candidates import Candidate, hypothesis, late_instead, resting, special_cases
 from ._effect import Effect, families
 from ._enough import is_itself
 from ._pairs import instead, pairs
@@ -65,8 +66,8 @@ class Found(NamedTuple):
     behind: list[LeftBehind]
 
 
-Beginning = tuple[Candidate, Structure, Mapping[str, float] | None]
-"""A candidate, the structure with the size of its effect, and the own values to begin with (None: as given)."""
+Beginning = tuple[Candidate, Structure, Begin | None]
+"""A candidate, the structure with the size of its effect, and where it begins otherwise (None: as given)."""
 
 
 class _Lot:
@@ -114,14 +115,14 @@ class _Lot:
 
 
 def fit_model(
-    model: Structure, records: Sequence[Nuisances], until: Sequence[int], near: Structure | None = None
+    model: Structure, records: Sequence[Nuisances], until: Sequence[int], near: Trial | None = None
 ) -> tuple[Trial, Trial]:
     """The model as given, and with its own values refitted, each the better of two climbs.
 
     One comes down the ladder, for values that are far off; one begins at the values as given, for a model that lacks
     something, whose top rungs lead astray. Of values refitted before, `near` tells them.
     """
-    own = None if near is None else values_found(model, near)
+    own = None if near is None else own_part(found_in(near))
     both = min(2, lanes_of(model))
     ladder = LADDER if near is None else LADDER[-1:]
 
@@ -148,7 +149,7 @@ def refit_from(
 ) -> Trial:
     """The model refitted, the better of two climbs: its own may have stopped below where one from own values leads that
     were found beside an effect."""
-    begins = [values_found(model, t.structure) for t in sorted(beside, key=lambda t: t.value)[: lanes_of(model)]]
+    begins = [own_part(found_in(t)) for t in sorted(beside, key=lambda t: t.value)[: lanes_of(model)]]
     if not begins:
         return refitted
     posterior = Posterior(hypothesis(model, [model] * len(begins), records, begins=begins), records, until)
@@ -158,7 +159,7 @@ def refit_from(
     return again if again.evidence > refitted.evidence else refitted
 
 
-def groups(tried: Sequence[Candidate], own: Mapping[str, float] | None) -> list[list[Beginning]]:
+def groups(tried: Sequence[Candidate], own: Begin | None) -> list[list[Beginning]]:
     """Starts that can share a program, in lots of its lanes: one law, whatever its sign and place.
 
     A law starts twice, from the own values as given and from those of the refit: either may be far from what is right
@@ -168,7 +169,7 @@ def groups(tried: Sequence[Candidate], own: Mapping[str, float] | None) -> list[
     lots = []
     for candidate in tried:
         gain = all(effect.cause.is_sensor for effect in candidate.effects)
-        begins = [candidate.own] if candidate.own or gain or own is None else [None, own]
+        begins = [candidate.begin] if candidate.begin or gain or own is None else [None, own]
         alone = lanes_of(candidate.starts[0]) == 1  # all starts of one candidate then, of which one climbs
         law = tuple(effect.cause.effect for effect in candidate.effects)
         lot = by_law.setdefault((law, candidate if alone else None), [])
@@ -189,7 +190,7 @@ def search(
     tell: Callable[[str, int], None],
 ) -> Found:
     """Every candidate fitted, those far behind only so far."""
-    own = values_found(model, refitted.structure) if refitted.evidence > given.evidence else None
+    own = own_part(found_in(refitted)) if refitted.evidence > given.evidence else None
     lots = [_Lot(beginnings, model, records, until, _ALONE.ladder) for beginnings in groups(tried, own)]
     most = sorted((candidate.share or 0.0 for candidate in tried), reverse=True)[:_PROMISING]
     kept = [lot for lot in lots if lot.share > 0 and lot.share >= most[-1]]
@@ -210,10 +211,14 @@ def search_akin(
 
     From elsewhere they may have stopped on the way.
     """
-    tried = [c for t in close for law in t.laws for c in special_cases(t.structure, law, every, model)]
-    tried += [c for t in close for law in t.laws for c in resting(t.structure, law, every, model, records[0])]
-    effects = [effect for c in every for effect in c.effects]
-    tried += [c for t in close for part in t.parts for c in late_instead(t.structure, part, effects, model)]
+    effects, tried = [effect for c in every for effect in c.effects], list[Candidate]()
+    for t in close:
+        begin = found_in(t)
+        for law in t.laws:
+            tried += special_cases(law, begin, every)
+            tried += resting(t.structure, law, begin, every, model, records[0])
+        for part in t.parts:
+            tried += late_instead(part, begin, effects, model)
     if not tried:
         return known
     lots = [_Lot(beginnings, model, records, until, _FROM_THERE.ladder) for beginnings in groups(tried, None)]

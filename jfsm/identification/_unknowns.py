@@ -62,6 +62,10 @@ class Unknown:
         scale = math.exp(self.tie[1] * exponent) if self.tie else 1.0
         return self.unit * scale * (math.exp(theta) if self.log else theta)
 
+    def coordinate(self, value: float) -> float:
+        """The theta of a number that is not tied."""
+        return math.log(value / self.unit) if self.log else value / self.unit
+
     def slope(self, theta: float) -> float:
         """Derivative of the number by theta."""
         return self.unit * (math.exp(theta) if self.log else 1.0)
