@@ -155,10 +155,11 @@ def leaving(t: Any, *power: float) -> Any:
     return t
 
 
-@pytest.mark.parametrize(("late", "two"), [(0.0, True), (1e-4, False)])
-def test_a_second_effect_may_show_in_one_part_of_a_decay_and_must_gain_wherever_the_first_leaves_anything(late, two):
+@pytest.mark.parametrize(("late", "whiteness", "two"), [(0.0, 0.2, True), (1e-4, 0.2, False), (1e-4, 0.02, True)])
+def test_a_second_effect_must_gain_wherever_the_first_leaves_anything_unless_the_two_leave_noise(late, whiteness, two):
     single, pair = trial(8000.0, 0.02, "coulomb"), trial(9000.0, 0.0, "coulomb", "end_stop")
     single, pair = leaving(single, 0.02, late), leaving(pair, 0.0, late)
+    pair.whiteness = whiteness
     assert something_left([REFITTED, single], REFITTED, lambda t: Unfit(0.0), imposed=False)
     decision = decide(GIVEN, REFITTED, [single, pair], lambda t: None, lambda t: Unfit(0.0), periods=100.0)
     assert (decision.winner is pair) == two
@@ -173,15 +174,18 @@ def test_a_second_effect_may_show_in_one_part_of_a_decay_and_must_gain_wherever_
         ("cubic_hardening", 0.0, 0.05, 20.0, True),  # noise hides it from every prediction
         ("cubic_hardening", 0.0, 0.05, 10.0, False),
         ("cubic_hardening", 3e-4, 0.2, 20.0, False),
+        ("accel_bias", 1e-3, 0.2, 120.0, True),  # whatever else is left, no force makes an acceleration's mean
+        ("accel_bias", 1e-3, 0.2, 60.0, False),
     ],
 )
 def test_a_second_effect_that_predictions_do_not_tell_is_told_by_evidence(second, left, whiteness, gained, two):
     single, pair = trial(8000.0, left, "coulomb"), trial(8000.0 + gained, left / 2, "coulomb", second)
     single.whiteness, pair.whiteness = whiteness, 0.02
-    law = jfsm.Preload(1.0, at=(0, 1)) if second == "preload" else jfsm.CubicStiffness(1.0, at=(0, 1))
-    offset = Unknown("offset@force-1.b", 0.0, 1.0, False, 0.0, 0.2)
-    single.unknowns, single.theta = (offset,), np.array([1.0])
-    single.laws, pair.laws = (jfsm.Coulomb(1.0, at=(0, 1)),), (jfsm.Coulomb(1.0, at=(0, 1)), law)
+    law = {"preload": (jfsm.Preload(1.0, at=(0, 1)),), "cubic_hardening": (jfsm.CubicStiffness(1.0, at=(0, 1)),)}
+    offset = "acceleration" if second == "accel_bias" else "force"
+    single.unknowns = (Unknown(f"offset@{offset}-1.b", 0.0, 1.0, False, 0.0, 0.2),)
+    single.theta = np.array([1.0])
+    single.laws, pair.laws = (jfsm.Coulomb(1.0, at=(0, 1)),), (jfsm.Coulomb(1.0, at=(0, 1)), *law.get(second, ()))
     for t in (single, pair):
         t.structure = SimpleNamespace(stiffness_of=lambda at: 1.0)
     decision = decide(GIVEN, REFITTED, [single, pair], lambda t: None, lambda t: Unfit(0.0), periods=100.0)

@@ -10,11 +10,20 @@ from scipy.integrate import solve_ivp
 
 import jfsm
 from jfsm.diagnosis._begin import Start, begun
-from jfsm.diagnosis._candidates import Candidate, candidates, chosen_causes, hypothesis, late_instead, special_cases
+from jfsm.diagnosis._candidates import (
+    Candidate,
+    Laws,
+    candidates,
+    chosen_causes,
+    hypothesis,
+    late_instead,
+    special_cases,
+)
 from jfsm.diagnosis._effect import Effect
 from jfsm.diagnosis._pairs import instead, pairs
+from jfsm.diagnosis._score import gains
 from jfsm.diagnosis._search import Found, LeftBehind, fit_model, refit_from, search, search_akin
-from jfsm.identification import prepare
+from jfsm.identification import Posterior, prepare
 from jfsm.structures import Coulomb, Stribeck, causes
 
 MODEL = jfsm.Structure.sdof(1.0, 9.0, 0.3)
@@ -113,17 +122,42 @@ def found_beside_friction(records: Any, *parts: Any, cause: str) -> Any:
     for part in parts:
         structure = structure + part
     effects = (Effect(known["coulomb"], (0, 1)), *(Effect(known[cause], part.at) for part in parts))
-    (unknowns,) = hypothesis(MODEL, [structure], records).unknowns
+    posed = hypothesis(MODEL, [structure], records)
+    (unknowns,) = posed.unknowns
     theta, found = np.full(len(unknowns), 0.07), structure + jfsm.Offset(0.3, at=("force", 1))
     return SimpleNamespace(
-        effects=effects, parts=(friction, *parts), structure=found, unknowns=unknowns, theta=theta, evidence=0.0
+        effects=effects,
+        parts=(friction, *parts),
+        structure=found,
+        unknowns=unknowns,
+        theta=theta,
+        evidence=0.0,
+        covariance=1e-6 * np.eye(theta.size),
+        posterior=lambda records, until: Posterior(posed, records, until),
     )
+
+
+def test_the_force_that_is_missing_would_gain_most_beside_a_refit(with_friction, fitted):
+    records, until = with_friction
+    _, refitted = fitted
+    laws = Laws(refitted.structure, records[0])
+    tried = [jfsm.Coulomb(0.3, at=(0, 1)), jfsm.CubicStiffness(0.1, at=(0, 1))]
+    forces = np.concatenate([laws.forces([law]) for law in tried])
+    forces = np.concatenate([forces, -forces[:1], np.full_like(forces[:1], np.nan), np.zeros_like(forces[:1])])
+    friction, spring, backwards, runaway, none = gains(refitted, refitted.posterior(records, until), forces)
+    best = max(
+        search(candidates(MODEL, records, chosen_causes(["coulomb"])), MODEL, *fitted, records, until, tell).trials,
+        key=lambda t: t.evidence,
+    )
+    assert 0.5 < friction / (best.evidence - refitted.evidence) < 2.0
+    assert backwards == runaway == none == 0.0
+    assert spring < 0.1 * friction
 
 
 def test_what_is_tried_beside_an_effect_begins_where_that_left_all_other_numbers(with_friction):
     records, _ = with_friction
     base, spring = found_beside_friction(records, cause="coulomb"), Effect(causes()["cubic_hardening"], (0, 1))
-    (pair,) = pairs([base], [spring], MODEL, records[0])
+    (pair,) = pairs([base], None, [spring], MODEL, *with_friction)
     (unknowns,) = hypothesis(MODEL, pair.starts[:1], records, begins=[pair.begin]).unknowns
     others = {u.path: u for u in unknowns if not u.path.startswith(("coulomb", "cubic"))}
     assert {"stiffness@0-1.k", "offset@force-1.b", "offset@displacement-1.b", "noise@0"} < others.keys()
@@ -145,7 +179,7 @@ def test_a_number_begins_where_it_is_said_to_and_is_believed_there(with_friction
 
 def test_a_constant_force_beside_another_effect_begins_as_what_the_offset_of_the_force_is(with_friction):
     base, preload = found_beside_friction(with_friction[0], cause="coulomb"), Effect(causes()["preload"], (0, 1))
-    (pair,) = pairs([base], [preload], MODEL, with_friction[0][0])
+    (pair,) = pairs([base], None, [preload], MODEL, *with_friction)
     assert {effect.cause.id for effect in pair.effects} == {"coulomb", "preload"}
     assert pair.starts[0].values()["preload@0-1.F"] == -0.3  # a reading too large by 0.3 is a force the other way
 
@@ -154,7 +188,7 @@ def test_beside_another_effect_an_early_channel_is_a_late_other_one_too(with_fri
     early = jfsm.ForceDelay(-0.04, at=("force", 1))
     late = Effect(causes()["channel_delay"], ("displacement", 1))
     pair = found_beside_friction(with_friction[0], early, cause="force_delay")
-    found = instead(pair, [*pair.effects, late], MODEL, with_friction[0][0])
+    found = instead(pair, [*pair.effects, late], MODEL, *with_friction)
     starts = [start.values() for c in found for start in c.starts if late in c.effects]
     assert 0.04 in [values["channel_delay@displacement-1.tau"] for values in starts]
     assert all(values["coulomb@0-1.F"] == 0.8 for values in starts)

@@ -81,7 +81,9 @@ def test_pairs_are_tried_that_explain_most_together_whatever_each_explains_alone
     nuisances = prepare(record(stopped_and_damped), MODEL)
     chosen = chosen_causes(("end_stop", "quadratic_damping", "coulomb", "quadratic_stiffness", "force_gain"))
     every: list[Candidate] = candidates(MODEL, [nuisances], chosen)
-    tried = pairs([], [effect for one in every for effect in one.effects], MODEL, nuisances)
+    tried = pairs(
+        [], None, [effect for one in every for effect in one.effects], MODEL, [nuisances], [nuisances.samples]
+    )
     first = tried[0]
     assert {effect.cause.id for effect in first.effects} == {"end_stop", "quadratic_damping"}
     assert [type(term) for term in first.starts[0].terms[-2:]] == [e.cause.effect for e in first.effects]

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from itertools import chain, product, zip_longest
 
 import equinox as eqx
+import numpy as np
 
 from .._threads import side_by_side
 from ..identification import (
@@ -18,6 +19,7 @@ from ..identification import (
     Unknown,
     about_a_rest,
     effect_unknown,
+    forces_of,
     lanes_of,
     missing_force,
     natural_size,
@@ -240,6 +242,10 @@ class Laws:
         """Shapes of a law that explain most; the sizes of `others`, which the structure has, are free beside it."""
         law, sign = self._law(effect), effect.cause.sign
         return place(law, self.missing, self.structure, self.scale, self.nuisances, others, sign, sides=True)
+
+    def forces(self, terms: Sequence[AbstractTerm]) -> np.ndarray:
+        """Forces (terms, n, dof) of shapes of one law along the smoothed motion."""
+        return forces_of(terms, self.missing, self.structure, self.nuisances)
 
     def together(self, effects: Sequence[Effect], pairs: Sequence[tuple[int, int]]) -> list[PlacedTogether]:
         """The best shapes of each of these `pairs` of laws, those first that explain most together."""

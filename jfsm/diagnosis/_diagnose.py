@@ -29,7 +29,7 @@ from ._lack_of_fit import LackOfFit
 from ._next import Leading
 from ._report import Tested, assemble
 from ._residual import residual, stand_in
-from ._search import Found, LeftBehind, fit_model, refit_from, search, search_akin, search_pairs
+from ._search import LeftBehind, fit_model, refit_from, search, search_akin, search_known, search_pairs
 from ._trial import Trial
 from ._untold import in_step, untold
 
@@ -107,10 +107,10 @@ def diagnose(
     steps.next("the model as given and refitted")
     study = _Study(model, chosen, places, reconstruction, key, steps.next, pairs=max_causes > 1)
     studied = study.of(training, unless_later=isinstance(holdout, float))
-    if studied is None:  # as much is kept back of the first part
+    if isinstance(studied, Trial):  # as much is kept back of the first part
         training, held = split(record, holdout, first=True)
-        studied = study.of(training)
-        assert studied is not None
+        studied = study.of(training, known=studied)
+        assert not isinstance(studied, Trial)
     records, until, every, found = studied
     steps.next("the verdict")
     records, found, decision = _decided(found, records, until)
@@ -166,69 +166,71 @@ class _Study:
     pairs: bool
 
     def of(
-        self, training: Sequence[tuple[Record, int]], *, unless_later: bool = False
-    ) -> tuple[list[Nuisances], list[int], list[Candidate], _Searched] | None:
+        self, training: Sequence[tuple[Record, int]], *, unless_later: bool = False, known: Trial | None = None
+    ) -> tuple[list[Nuisances], list[int], list[Candidate], _Searched] | Trial:
         """Records as the likelihood sees them, how many samples are fitted, what could be tried, what was found.
 
-        None where what the model lacks shows in what was kept back, which then has to be fitted, `unless_later`.
+        Where what is lacking shows in what was kept back, which then has to be fitted, the trial beside which it does,
+        `unless_later`; that is `known` then.
         """
         records, until, given, refitted = _believed(training, self.model, self.reconstruction)
         if unless_later and _later(refitted, NEGLIGIBLE):
-            return None
+            return refitted
         every = candidates(self.model, records, self.chosen, self.places)
-        found = _searched(every, self.model, given, refitted, records, until, self.key, self.tell, pairs=self.pairs)
-        if unless_later and _later(max(found.every, key=lambda t: t.evidence), MUCH):
-            return None
+        found = self._searched(every, given, refitted, records, until, known)
+        best = max(found.every, key=lambda t: t.evidence)
+        if unless_later and _later(best, MUCH):
+            return best
         return records, until, every, found
 
+    def _searched(
+        self,
+        every: list[Candidate],
+        given: Trial,
+        refitted: Trial,
+        records: Sequence[Nuisances],
+        until: Sequence[int],
+        known: Trial | None,
+    ) -> _Searched:
+        """Single effects fitted, the promising ones first, and pairs of them where that leaves something."""
+        model, tell = self.model, self.tell
+        stands_for_the_drive = in_step(records)
 
-def _searched(
-    every: list[Candidate],
-    model: Structure,
-    given: Trial,
-    refitted: Trial,
-    records: Sequence[Nuisances],
-    until: Sequence[int],
-    key: jax.Array,
-    tell: Callable[[str, int], None],
-    *,
-    pairs: bool,
-) -> _Searched:
-    """Single effects fitted, the promising ones first, and pairs of them where that leaves something."""
-    stands_for_the_drive = in_step(records)
+        def told(trials: Sequence[Trial]) -> list[Trial]:
+            return [t for t in trials if not stands_for_the_drive(t)]
 
-    def told(trials: Sequence[Trial]) -> list[Trial]:
-        return [t for t in trials if not stands_for_the_drive(t)]
+        def close(trials: Sequence[Trial]) -> list[Trial]:
+            best = max(told([given, refitted, *trials]), key=lambda t: t.evidence)
+            return [t for t in trials if t is best or explained(t, refitted) >= GATE]
 
-    def close(trials: Sequence[Trial]) -> list[Trial]:
-        best = max(told([given, refitted, *trials]), key=lambda t: t.evidence)
-        return [t for t in trials if t is best or explained(t, refitted) >= GATE]
-
-    tried, left_out = promising(every)
-    found = search(tried, model, given, refitted, records, until, tell)
-    if settled(told([given, refitted, *found.trials]), refitted):
-        more = contained([law for t in close(found.trials) for law in t.laws], left_out)
-    else:  # of a missing force that is ill seen regression may put the right law last
-        more = [c for c in left_out if c.starts]
-    if more:
-        then = search(more, model, given, refitted, records, until, tell)
-        found = Found(found.trials + then.trials, found.behind + then.behind)
-        left_out = [c for c in left_out if c not in more]
-    found = search_akin(close(found.trials), every, found, model, records, until, tell)
-    refitted = refit_from(found.trials, refitted, model, records, until)
-    trials, behind = [t.beside(refitted) for t in found.trials], found.behind
-    louder = noise_beyond([given, refitted, *trials], records, until)
-    trials = [t.amid(louder) for t in (given, refitted, *trials)]
-    given, refitted, *trials = beside_chance(trials, model, records, until, key)
-    lack = LackOfFit(records, until)
-    imposed = records[0].path is not None
-    effects = _beside(told([given, refitted, *trials]), refitted, every, lack, imposed=imposed) if pairs else []
-    if effects:
-        found = search_pairs(effects, trials, model, refitted, records, until, tell)
-        trials = [given, refitted, *trials, *(t.beside(refitted).amid(louder) for t in found.trials)]
-        given, refitted, *trials = beside_chance(trials, model, records, until, key)
-        behind = [*behind, *found.behind]
-    return _Searched(given, refitted, trials, behind, left_out, lack)
+        tried, left_out = promising(every)
+        found = search(tried, model, given, refitted, records, until, tell)
+        if settled(told([given, refitted, *found.trials]), refitted):
+            more = contained([law for t in close(found.trials) for law in t.laws], left_out)
+        else:  # of a missing force that is ill seen regression may put the right law last
+            more = [c for c in left_out if c.starts]
+        if more:
+            found = found.and_then(search(more, model, given, refitted, records, until, tell))
+            left_out = [c for c in left_out if c not in more]
+        found = search_akin(close(found.trials), every, found, model, records, until, tell)
+        if known is not None and len(known.effects) == 1:
+            found = search_known(known, found, model, records, until, tell)
+        refitted = refit_from(found.trials, refitted, model, records, until)
+        trials, behind = [t.beside(refitted) for t in found.trials], found.behind
+        louder = noise_beyond([given, refitted, *trials], records, until)
+        trials = [t.amid(louder) for t in (given, refitted, *trials)]
+        given, refitted, *trials = beside_chance(trials, model, records, until, self.key)
+        lack = LackOfFit(records, until)
+        imposed = records[0].path is not None
+        effects = (
+            _beside(told([given, refitted, *trials]), refitted, every, lack, imposed=imposed) if self.pairs else []
+        )
+        if effects:
+            found = search_pairs(effects, trials, known, model, refitted, records, until, tell)
+            trials = [given, refitted, *trials, *(t.beside(refitted).amid(louder) for t in found.trials)]
+            given, refitted, *trials = beside_chance(trials, model, records, until, self.key)
+            behind = [*behind, *found.behind]
+        return _Searched(given, refitted, trials, behind, left_out, lack)
 
 
 def _decided(

@@ -190,9 +190,7 @@ def separation(leading: Leading, record: Record) -> float:
 
 def _evidence(model: Structure, nuisances: Nuisances, rival: Trial) -> float:
     """Log-evidence of a rival on another record, from where the one at hand left its numbers."""
-    start = model
-    for part in rival.parts:
-        start = start + part
+    start = rival.effects_on(model)
     lanes = lanes_of(start)
     records = [nuisances.resolving([start])]
     own = own_part(found_in(rival))

@@ -4,7 +4,9 @@ from collections.abc import Sequence
 from itertools import combinations
 from typing import NamedTuple
 
-from ..identification import Nuisances
+import numpy as np
+
+from ..identification import Nuisances, Placed
 from ..structures import (
     AbstractSensor,
     AbstractTerm,
@@ -17,14 +19,15 @@ from ..structures import (
 from ._begin import found_in
 from ._candidates import SHAPES, Candidate, Laws, natural_starts, other_delay
 from ._effect import Effect
+from ._score import gains
 from ._trial import Trial
 
 _BASES = 5
 """Causes beside which a second one is looked for, at most: the best of each family."""
 _BESIDE = 2
-"""Laws that are tried beside each, those that explain most of what it leaves,"""
+"""Laws that are tried beside each, those that promise most,"""
 _PAIRS = 6
-"""and of these pairs those that leave least."""
+"""and of these pairs those that promise most."""
 _WITH_UNTOLD = 2
 """Bases beside which effects are tried that no missing force tells of, sensors' faults before all."""
 _TOGETHER = 4
@@ -36,31 +39,38 @@ _ONE_SPRING = {QuadraticStiffness, CubicStiffness}
 
 
 class _Pair(NamedTuple):
-    """A pair to be tried, and the mean square force that it leaves; none is known where no missing force tells."""
+    """A pair to be tried, and what it promises: its evidence as far as a first step tells, or, along an imposed motion,
+    minus the mean square force that it leaves; None where nothing tells."""
 
     candidate: Candidate
-    left: float | None
+    promise: float | None
 
 
 def pairs(
-    singles: Sequence[Trial], effects: Sequence[Effect], model: Structure, nuisances: Nuisances
+    singles: Sequence[Trial],
+    known: Trial | None,
+    effects: Sequence[Effect],
+    model: Structure,
+    records: Sequence[Nuisances],
+    until: Sequence[int],
 ) -> list[Candidate]:
-    """Pairs to be tried, from what single causes explain and what they leave."""
+    """Pairs to be tried, from what single causes explain and what they leave; what is `known` to act before others."""
     found: list[_Pair] = []
     families: list[str] = []
-    for base in sorted(singles, key=lambda t: -t.evidence):
+    surely = () if known is None else known.effects
+    for base in sorted(singles, key=lambda t: (t.effects != surely, -t.evidence)):
         family = base.effects[0].cause.family
         if family in families or len(families) == _BASES:
             continue
         families.append(family)
-        beside = _beside(base, base.structure, 0, effects, model, nuisances)
+        beside = _beside(base, base.structure, 0, effects, model, records, until)
         if len(families) <= _WITH_UNTOLD:
-            found += [pair for pair in beside if pair.left is None]
+            found += [pair for pair in beside if pair.promise is None]
         found += _best(beside, _BESIDE)
-    untold = [pair.candidate for pair in found if pair.left is None]
+    untold = [pair.candidate for pair in found if pair.promise is None]
     tried = untold + [pair.candidate for pair in _best(found, _PAIRS)]
     done = {candidate.effects for candidate in tried}
-    return tried + [c for c in _together(effects, model, nuisances) if c.effects not in done]
+    return tried + [c for c in _together(effects, model, records[0]) if c.effects not in done]
 
 
 def _together(effects: Sequence[Effect], model: Structure, nuisances: Nuisances) -> list[Candidate]:
@@ -79,14 +89,16 @@ def _together(effects: Sequence[Effect], model: Structure, nuisances: Nuisances)
     return list(found.values())
 
 
-def instead(pair: Trial, effects: Sequence[Effect], model: Structure, nuisances: Nuisances) -> list[Candidate]:
+def instead(
+    pair: Trial, effects: Sequence[Effect], model: Structure, records: Sequence[Nuisances], until: Sequence[int]
+) -> list[Candidate]:
     """Pairs that share an effect with one that was found, its neighbours."""
     found = []
     for kept, changed in ((0, 1), (1, 0)):
         rest = pair.structure.without(pair.parts[changed])
-        beside = _beside(pair, rest, kept, effects, model, nuisances)
+        beside = _beside(pair, rest, kept, effects, model, records, until)
         if pair.effects[changed].cause.is_sensor:
-            found += [one.candidate for one in beside if one.left is None]
+            found += [one.candidate for one in beside if one.promise is None]
         effect, part = pair.effects[kept], pair.parts[kept]
         for other, late in other_delay(pair.parts[changed], effects):
             starts = (_both(model, effect, part, other, late),)
@@ -96,36 +108,58 @@ def instead(pair: Trial, effects: Sequence[Effect], model: Structure, nuisances:
 
 
 def _best(found: Sequence[_Pair], most: int) -> list[_Pair]:
-    """Those that leave least of a missing force."""
-    told = [(pair.left, i) for i, pair in enumerate(found) if pair.left is not None]
+    """Those that promise most."""
+    told = [(-pair.promise, i) for i, pair in enumerate(found) if pair.promise is not None]
     return [found[i] for _, i in sorted(told)[:most]]
 
 
 def _beside(
-    base: Trial, structure: Structure, kept: int, effects: Sequence[Effect], model: Structure, nuisances: Nuisances
+    base: Trial,
+    structure: Structure,
+    kept: int,
+    effects: Sequence[Effect],
+    model: Structure,
+    records: Sequence[Nuisances],
+    until: Sequence[int],
 ) -> list[_Pair]:
     """Pairs of one effect of a trial, which `structure` has, with every other."""
     effect, part = base.effects[kept], base.parts[kept]
-    laws, others = Laws(structure, nuisances), [part] if isinstance(part, AbstractTerm) else []
+    laws, others = Laws(structure, records[0]), [part] if isinstance(part, AbstractTerm) else []
     begin = found_in(base)
     found: list[_Pair] = []
+    placed: list[tuple[Effect, list[Placed]]] = []
     for other in effects:
         if not _are_two(effect, other):
             continue
         constant = _instead_of_an_offset(base, other)
         if constant is not None:
-            starts, left = (_both(model, effect, part, other, constant),), None
+            both = _both(model, effect, part, other, constant)
+            found.append(_Pair(Candidate(_ordered(effect, other), (both,), begin=begin), None))
         elif other.cause.is_sensor:
-            starts, left = natural_starts(model + part, *other, nuisances), None
-        else:
-            placed = laws.placed(other, others)[:SHAPES]
-            starts = tuple(_both(model, effect, part, other, start.term) for start in placed)
-            left = placed[0].left if placed and placed[0].share is not None else None
-        if starts:
             # A gain lies on a ridge with the own values: it begins at those as given, and at their end of it.
-            there = None if other.cause.is_sensor and not constant else begin
-            found.append(_Pair(Candidate(_ordered(effect, other), starts, begin=there), left))
+            starts = natural_starts(model + part, *other, records[0])
+            found.append(_Pair(Candidate(_ordered(effect, other), starts), None))
+        elif shapes := laws.placed(other, others):
+            placed.append((other, shapes))
+    gained = _gains(base, laws, [shapes for _, shapes in placed], records, until)
+    for (other, shapes), nats in zip(placed, gained, strict=True):
+        best = sorted(zip(shapes, nats, strict=True), key=lambda one: -one[1])[:SHAPES]
+        starts = tuple(_both(model, effect, part, other, shape.term) for shape, _ in best)
+        shape, most = best[0]
+        promise = None if shape.share is None else most
+        found.append(_Pair(Candidate(_ordered(effect, other), starts, begin=begin), promise))
     return found
+
+
+def _gains(
+    base: Trial, laws: Laws, placed: Sequence[list[Placed]], records: Sequence[Nuisances], until: Sequence[int]
+) -> list[list[float]]:
+    """What each shape of each law promises beside a trial."""
+    if records[0].path is not None or not placed:
+        return [[-shape.left for shape in shapes] for shapes in placed]
+    forces = [laws.forces([shape.term for shape in shapes]) for shapes in placed]
+    nats = base.evidence + gains(base, base.posterior(records, until), np.concatenate(forces))
+    return [part.tolist() for part in np.split(nats, np.cumsum([len(shapes) for shapes in placed])[:-1])]
 
 
 def _instead_of_an_offset(base: Trial, other: Effect) -> AbstractTerm | AbstractSensor | None:

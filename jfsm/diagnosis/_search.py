@@ -46,7 +46,9 @@ _ALONE = _Way((0.3, 0.03, 0.01), 10, 0.5)
 _TOGETHER = _Way((0.03, 0.01), 6, 0.25)
 """Of pairs: one of the two has been fitted already."""
 _INSTEAD = _TOGETHER._replace(to_the_end=True)
-"""Of those that share an effect with the best pair."""
+"""Of those that share an effect with the best pair,"""
+_ROUNDS = 3
+"""which are looked for so many times, at most."""
 
 _FROM_THERE = _Way(LADDER[-1:], 1, 1.0)
 """From numbers of what is akin."""
@@ -64,6 +66,13 @@ class Found(NamedTuple):
 
     trials: list[Trial]
     behind: list[LeftBehind]
+
+    def and_then(self, found: "Found") -> "Found":
+        """With what was found later."""
+        trials = _best_of_each([*self.trials, *found.trials])
+        done = {t.effects for t in trials}
+        behind = {one.effects: one for one in (*self.behind, *found.behind) if one.effects not in done}
+        return Found(trials, list(behind.values()))
 
 
 Beginning = tuple[Candidate, Structure, Begin | None]
@@ -223,41 +232,57 @@ def search_akin(
         return known
     lots = [_Lot(beginnings, model, records, until, _FROM_THERE.ladder) for beginnings in groups(tried, None)]
     best = min(known.trials, key=lambda t: t.value)
-    trials = _best_of_each([*known.trials, *_climbed(lots, _FROM_THERE, [], best, tell).trials])
-    done = {t.effects for t in trials}
-    return Found(trials, [one for one in known.behind if one.effects not in done])
+    return known.and_then(_climbed(lots, _FROM_THERE, [], best, tell))
+
+
+def search_known(
+    found: Trial,
+    others: Found,
+    model: Structure,
+    records: Sequence[Nuisances],
+    until: Sequence[int],
+    tell: Callable[[str, int], None],
+) -> Found:
+    """What another part of the records told, fitted from there too."""
+    tried = [Candidate(found.effects, (found.effects_on(model),), begin=own_part(found_in(found)))]
+    lots = [_Lot(beginnings, model, records, until, _FROM_THERE.ladder) for beginnings in groups(tried, None)]
+    best = min(others.trials, key=lambda t: t.value)
+    return others.and_then(_climbed(lots, _FROM_THERE, lots, best, tell))
 
 
 def search_pairs(
     effects: Sequence[Effect],
     singles: Sequence[Trial],
+    known: Trial | None,
     model: Structure,
     refitted: Trial,
     records: Sequence[Nuisances],
     until: Sequence[int],
     tell: Callable[[str, int], None],
 ) -> Found:
-    """Pairs of good single causes fitted, then those that share one with the best pair."""
+    """Pairs of good single causes fitted, then those that share one with the best pair, as long as that changes.
+
+    What is `known` to act is one of the good ones.
+    """
     best = min([refitted, *singles], key=lambda t: t.value)
 
     def climbed(tried: Sequence[Candidate], way: _Way, kept: list[str] | None = None) -> Found:
         lots = [_Lot(beginnings, model, records, until, way.ladder) for beginnings in groups(tried, None)]
         return _climbed(lots, way, [lot for lot in lots if lot.families == kept], best, tell)
 
-    first = climbed(pairs(singles, effects, model, records[0]), _TOGETHER)
-    named = [t for t in first.trials if is_itself(t)]
-    leader = max(named, key=lambda t: t.evidence, default=best)
-    if explained(leader, best) < GATE and leader.evidence - best.evidence < SIGNIFICANT:
-        return first
-    done = {t.effects for t in first.trials}
-    # From the leader's numbers some may arrive that were left behind from elsewhere. Those of its own families are seen
-    # off at their tops only: laws alike tell apart late.
-    near = [c for c in instead(leader, effects, model, records[0]) if c.effects not in done]
-    then = climbed(near, _INSTEAD, kept=families(leader.effects))
-    trials = first.trials + then.trials
-    done = {t.effects for t in trials}
-    behind = {one.effects: one for one in (*first.behind, *then.behind) if one.effects not in done}
-    return Found(trials, list(behind.values()))
+    found, before = climbed(pairs(singles, known, effects, model, records, until), _TOGETHER), best
+    for _ in range(_ROUNDS):
+        leader = max((t for t in found.trials if is_itself(t)), key=lambda t: t.evidence, default=best)
+        gained = leader.evidence - before.evidence
+        if gained < SIGNIFICANT and (before is not best or explained(leader, best) < GATE):
+            break
+        # From the leader's numbers some may arrive that stopped on their way from elsewhere. Those of its own families
+        # are seen off at their tops only: laws alike tell apart late.
+        kin, done = families(leader.effects), {t.effects for t in found.trials}
+        near = instead(leader, effects, model, records, until)
+        near = [c for c in near if c.effects not in done or families(c.effects) == kin]
+        found, before = found.and_then(climbed(near, _INSTEAD, kept=kin)), leader
+    return found
 
 
 def _climbed(

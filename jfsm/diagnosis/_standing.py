@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..structures import Preload
+from ..structures import AccelerationBias, Preload
 from ._adequacy import GATE, NEGLIGIBLE, SIGNIFICANT, adequate, explained, unexplained
 from ._enough import MAY_HIDE, WORTH_A_SECOND, hidden, strain
 from ._trial import Trial, ended, own_values
@@ -14,6 +14,8 @@ _SECOND = 15.0
 """Nats by which two effects must beat either of them alone."""
 _WORTH_TO_NOISE = 0.01
 """Share of the refit's error by which two effects that leave noise only must predict better than either alone."""
+_BIAS = 100.0
+"""Nats by which a bias must beat an offset that stands for it where both leave something."""
 UNPREDICTED = 15.0
 """Nats by which a cause must beat a refit whose predictions leave nothing: of many, one gains some by chance."""
 _UNSEEN = 0.1
@@ -90,8 +92,20 @@ def _hides(t: Trial, alone: Trial) -> bool:
     """Whether what two effects have beside one alone may hide in own values and offsets of that: what is believed of
     these tells them. Where one alone leaves something it is hard to believe that they hide it."""
     kinds = MAY_HIDE if adequate(alone) else hidden([alone])
-    beside = [effect for effect in t.effects if effect not in alone.effects]
-    return alone.prediction.left < NEGLIGIBLE and len(beside) == 1 and beside[0].cause.effect in kinds
+    return alone.prediction.left < NEGLIGIBLE and _adds(t, alone) in kinds
+
+
+def _shows_as_a_bias(t: Trial, alone: Trial) -> bool:
+    """Whether it has a bias beside one effect alone that an offset hardly stands for. No force that is missing makes an
+    acceleration's mean, so what either leaves does not speak against it."""
+    bias = _adds(t, alone) is AccelerationBias and AccelerationBias in hidden([alone])
+    return bias and t.evidence - alone.evidence > _BIAS
+
+
+def _adds(t: Trial, alone: Trial) -> type | None:
+    """What a pair has beside one of its effects alone."""
+    beside = [effect.cause.effect for effect in t.effects if effect not in alone.effects]
+    return beside[0] if len(beside) == 1 else None
 
 
 def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
@@ -105,15 +119,17 @@ def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
         if alone is not best and alone.effects[0] not in t.effects:
             continue
         hides = _hides(t, alone)
+        if _shows_as_a_bias(t, alone):
+            continue
         if adequate(t) and (hides or not np.any(unexplained(alone))):  # predictions do not tell
             least = SIGNIFICANT if hides and adequate(alone) else _SECOND
             if t.evidence - alone.evidence <= least:
                 return f"{alone.effects[0].label} alone is about as probable"
             continue
-        gained = _size(alone.prediction.excess) - _size(t.prediction.excess)
+        before, after = _size(alone.prediction.excess), _size(t.prediction.excess)
         worth = _WORTH_TO_NOISE if adequate(t) else WORTH_A_SECOND
-        enough = explained(t, alone) >= GATE and gained >= worth * size
-        if not enough or t.evidence - alone.evidence <= _SECOND:
+        share = 1.0 - (after / before) ** 2 if adequate(t) else explained(t, alone)
+        if share < GATE or before - after < worth * size or t.evidence - alone.evidence <= _SECOND:
             return f"{alone.effects[0].label} alone explains it about as well"
     return ""
 

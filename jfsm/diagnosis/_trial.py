@@ -112,6 +112,12 @@ class Trial:
         """The terms that the effects add; sensors add none."""
         return tuple(part for part in self.parts if isinstance(part, AbstractTerm))
 
+    def effects_on(self, model: Structure) -> Structure:
+        """The model with its effects."""
+        for part in self.parts:
+            model = model + part
+        return model
+
     def posterior(self, records: Sequence[Nuisances], until: Sequence[int]) -> Posterior:
         """The posterior of its structure, on records in steps that are short enough for it."""
         records = [n.resolving([self.structure]) for n in records]

@@ -20,6 +20,7 @@ from ._posterior import lanes_of as lanes_of
 from ._posterior import prior as prior
 from ._starts import Placed as Placed
 from ._starts import about_a_rest as about_a_rest
+from ._starts import forces_of as forces_of
 from ._starts import missing_force as missing_force
 from ._starts import place as place
 from ._starts import scale_of as scale_of

@@ -262,22 +262,9 @@ class Regression:
 
     def columns(self, rows: list[dict[str, float]]) -> tuple[np.ndarray, list[dict[str, float]]]:
         """Forces (rows, samples x dof) of those shapes that do not run away along the motion, and these."""
-        forces = self._forces(rows)
-        stable = self._stable(forces)
-        if type(self.law).states and not np.all(stable):
-            stiff = np.flatnonzero(~stable)
-            forces[stiff] = self._forces([rows[k] for k in stiff], _FINER)
-            stable = self._stable(forces)
-        rows = list(compress(rows, stable))
+        forces, stable = _forces_of(self.law, rows, self.structure, self.motion, np.max(self.spread))
+        forces, rows = forces[:, : len(self.moves)], list(compress(rows, stable))
         return (forces[stable][:, self.moves] / self.spread).reshape(len(rows), self.missing.size), rows
-
-    def _forces(self, rows: list[dict[str, float]], finer: int = 1) -> np.ndarray:
-        lots = _lots(type(self.law), rows)
-        forces = [_forces(self.law, lot, self.structure, self.motion, finer)[: len(some)] for some, lot in lots]
-        return np.concatenate(forces)[:, : len(self.moves)]
-
-    def _stable(self, forces: np.ndarray) -> np.ndarray:
-        return np.max(np.abs(forces), (1, 2)) < _RUN_AWAY * np.max(self.spread)  # false for what is no number, too
 
     def linear(self, columns: np.ndarray) -> bool:
         """Whether springs, dashpots and constants make all of these forces, so that regression cannot tell."""
@@ -409,6 +396,38 @@ def _still_afterwards(latent: Latent, time: np.ndarray) -> tuple[jax.Array, jax.
     x = np.pad(latent.displacement, ((0, more), (0, 0)), "edge")
     v = np.pad(latent.velocity, ((0, more), (0, 0)))
     return jnp.asarray(x), jnp.asarray(v), jnp.asarray(np.concatenate([time, later]))
+
+
+def forces_of(terms: Sequence[AbstractTerm], latent: Latent, structure: Structure, nuisances: Nuisances) -> np.ndarray:
+    """Forces (terms, n, dof) of terms of one class at one place along a smoothed motion, no numbers where they run
+    away."""
+    n = len(latent.force)
+    motion = _still_afterwards(latent, np.asarray(nuisances.record.time[:n]))
+    rows = [dict(zip((p.name for p in t.parameters), map(float, t.values), strict=True)) for t in terms]
+    forces, stable = _forces_of(terms[0], rows, structure, motion, max(float(np.max(latent.force.std(0))), 1e-300))
+    return np.where(stable[:, None, None], forces[:, :n], np.nan)
+
+
+def _forces_of(
+    law: AbstractTerm, rows: list[dict[str, float]], structure: Structure, motion, usual: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Forces (rows, n, dof) of a law's shapes along a motion, and which of them do not run away from a `usual` size.
+
+    In finer steps where hidden states need them.
+    """
+
+    def of(rows: list[dict[str, float]], finer: int = 1) -> np.ndarray:
+        lots = _lots(type(law), rows)
+        return np.concatenate([_forces(law, lot, structure, motion, finer)[: len(some)] for some, lot in lots])
+
+    def stable(forces: np.ndarray) -> np.ndarray:
+        return np.max(np.abs(forces), (1, 2)) < _RUN_AWAY * usual  # false for what is no number, too
+
+    forces = of(rows)
+    if type(law).states and not np.all(stable(forces)):
+        stiff = np.flatnonzero(~stable(forces))
+        forces[stiff] = of([rows[k] for k in stiff], _FINER)
+    return forces, stable(forces)
 
 
 def _forces(law: AbstractTerm, numbers: np.ndarray, structure: Structure, motion, finer: int) -> np.ndarray:

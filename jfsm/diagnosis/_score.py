@@ -1,0 +1,89 @@
+"""The score test: what a small force beside those of a trial would explain of its innovations.
+
+C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50-57. The force is added to what drives the filter, and the innovations are
+regressed on what it does to them beside what the trial's own unknowns do.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from jax import Array
+
+from .._threads import side_by_side
+from ..identification import Posterior
+from ._trial import Trial
+
+_SMALL = 1e-4
+"""Size of the force that is added, as a share of the elastic force."""
+_NUDGE = 1e-2
+"""Change of an unknown that shows what it does, in its standard errors."""
+_APART = 1e-6
+"""Singular values, as shares of the largest, below which shapes are no longer told apart."""
+
+
+class Moved(NamedTuple):
+    """Fitted readings of a record in their standard deviations: innovations, and how unknowns and forces move them."""
+
+    error: np.ndarray
+    by_unknown: np.ndarray
+    by_force: np.ndarray
+
+
+def moved(trial: Trial, posterior: Posterior, index: int, forces: np.ndarray) -> Moved:
+    """What each unknown and each restoring force (forces, n, dof) of unit size does to record `index`."""
+    nuisances, theta = posterior.records[index], trial.theta
+    slack = nuisances.forgiven
+    base = posterior.innovations(theta, index, slack=slack)
+    error, deviation = np.asarray(base.error), np.sqrt(np.maximum(base.variance, 1e-300))
+    counted = np.asarray(nuisances.readings.use)[: len(error)] > 0
+    counted[0], counted[posterior.until[index] :] = False, False  # the start is an unknown
+
+    def ours(readings: np.ndarray) -> np.ndarray:
+        return readings[counted] / deviation[counted]
+
+    def change_of(then: Array, change: float) -> np.ndarray:
+        return ours(np.asarray(then) - error) / change
+
+    def by_unknown(k: int) -> np.ndarray:
+        if trial.unknowns[k].path.startswith("noise@") or trial.unknowns[k].record not in (None, index):
+            return np.zeros(np.count_nonzero(counted))
+        change = _NUDGE * max(math.sqrt(max(trial.covariance[k, k], 0.0)), 1e-9)
+        nudged = theta + change * (np.arange(theta.size) == k)
+        return change_of(posterior.innovations(nudged, index, slack=slack).error, change)
+
+    def by_force(force: np.ndarray) -> np.ndarray:
+        push = -_SMALL * nuisances.elastic_force(trial.structure) * force
+        return change_of(posterior.innovations(theta, index, push=push, slack=slack).error, _SMALL)
+
+    unknowns, pushed = side_by_side(by_unknown, range(theta.size)), side_by_side(by_force, forces)
+    return Moved(ours(error), np.stack(list(unknowns), 1), np.stack(list(pushed), 1))
+
+
+def regressed(columns: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, int]:
+    """What least squares leave of one or several columns, and how many of the others are told apart."""
+    scale = np.linalg.norm(columns, axis=0)
+    columns = columns / np.where(scale > 0, scale, 1.0)
+    found, _, rank, _ = np.linalg.lstsq(columns, wanted, rcond=_APART)
+    return wanted - columns @ found, int(rank)
+
+
+def gains(trial: Trial, posterior: Posterior, forces: np.ndarray) -> np.ndarray:
+    """Nats that each restoring force (forces, n, dof) would gain by itself in the first record, of either size.
+
+    None where it runs away, or would have to act the other way round.
+    """
+    size = np.sqrt(np.mean(forces**2, (1, 2)))
+    told = np.isfinite(size) & (size > 0)
+    found = np.zeros(len(forces))
+    if not np.any(told):
+        return found
+    unit = forces[told] / size[told, None, None]
+    unit = np.pad(unit, ((0, 0), (0, posterior.records[0].samples - unit.shape[1]), (0, 0)))
+    error, by_unknown, by_force = moved(trial, posterior, 0, unit)
+    left, _ = regressed(by_unknown, np.column_stack([error, by_force]))
+    error, by_force = left[:, 0], left[:, 1:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gained = np.minimum(error @ by_force, 0.0) ** 2 / np.sum(by_force**2, 0) / 2
+    found[told] = np.nan_to_num(gained, nan=0.0, posinf=0.0)
+    return found
