@@ -27,6 +27,9 @@ _ALIKE = 0.3
 """Probability of another law of its family, in those of a law that is not of the right shape, that may take its place.
 """
 _LOOKS = (10.0, 40.0)
+_TEMPERED = 1.5
+"""By which evidence is divided that is trusted: noise levels and priors are known to some ten per cent only. With 2
+all of 63 hidden effects were right that were given 0.7 to 0.9."""
 
 
 @dataclass(frozen=True)
@@ -210,7 +213,7 @@ def probabilities(trials: Sequence[Trial], periods: float) -> np.ndarray:
     evidence = np.array([t.evidence for t in trials])
     best = trials[int(np.argmax(evidence))]
     if adequate(best):
-        score = evidence / 2  # tempered: noise levels and priors are known to some ten per cent only
+        score = evidence / _TEMPERED
     else:
         looks = min(max(periods / 5, _LOOKS[0]), _LOOKS[1])
         error = np.array([math.sqrt(float(np.mean(t.prediction.error))) for t in trials])

@@ -170,8 +170,8 @@ class _Study:
     ) -> tuple[list[Nuisances], list[int], list[Candidate], _Searched] | Trial:
         """Records as the likelihood sees them, how many samples are fitted, what could be tried, what was found.
 
-        Where what is lacking shows in what was kept back, which then has to be fitted, the trial beside which it does,
-        `unless_later`; that is `known` then.
+        Where what is lacking shows in what was kept back, which then has to be fitted, the best single trial beside
+        which it does, `unless_later`; that is `known` then.
         """
         records, until, given, refitted = _believed(training, self.model, self.reconstruction)
         if unless_later and _later(refitted, NEGLIGIBLE):
@@ -180,7 +180,7 @@ class _Study:
         found = self._searched(every, given, refitted, records, until, known)
         best = max(found.every, key=lambda t: t.evidence)
         if unless_later and _later(best, MUCH):
-            return best
+            return max((t for t in found.every if len(t.effects) < 2), key=lambda t: t.evidence)
         return records, until, every, found
 
     def _searched(
@@ -213,7 +213,7 @@ class _Study:
             found = found.and_then(search(more, model, given, refitted, records, until, tell))
             left_out = [c for c in left_out if c not in more]
         found = search_akin(close(found.trials), every, found, model, records, until, tell)
-        if known is not None and len(known.effects) == 1:
+        if known is not None and known.effects:
             found = search_known(known, found, model, records, until, tell)
         refitted = refit_from(found.trials, refitted, model, records, until)
         trials, behind = [t.beside(refitted) for t in found.trials], found.behind
