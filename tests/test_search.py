@@ -22,7 +22,7 @@ from jfsm.diagnosis._candidates import (
 from jfsm.diagnosis._effect import Effect
 from jfsm.diagnosis._pairs import instead, pairs
 from jfsm.diagnosis._score import gains
-from jfsm.diagnosis._search import Found, LeftBehind, fit_model, refit_from, search, search_akin
+from jfsm.diagnosis._search import Found, LeftBehind, fit_model, refit_from, search, search_akin, search_pairs
 from jfsm.identification import Posterior, prepare
 from jfsm.structures import Coulomb, Stribeck, causes
 
@@ -135,6 +135,20 @@ def found_beside_friction(records: Any, *parts: Any, cause: str) -> Any:
         covariance=1e-6 * np.eye(theta.size),
         posterior=lambda records, until: Posterior(posed, records, until),
     )
+
+
+def test_a_single_effect_that_stopped_on_its_way_is_fitted_again_from_the_best_pair_that_has_it(with_friction, fitted):
+    records, until = with_friction
+    every = candidates(MODEL, records, chosen_causes(["cubic_hardening", "coulomb"]))
+    spring, friction = (
+        next(c for c in every if c.effects[0].cause.id == name) for name in ("cubic_hardening", "coulomb")
+    )
+    alone = search([spring], MODEL, *fitted, records, until, tell).trials
+    effects = [*spring.effects, *friction.effects]
+    found = search_pairs(effects, alone, None, MODEL, fitted[1], records, until, tell)
+    (again,) = (t for t in found.trials if t.effects == friction.effects)
+    assert abs(again.structure.values()["coulomb@0-1.F"] - 0.8) < 0.05
+    assert again.evidence > max(t.evidence for t in alone) + 100.0
 
 
 def test_the_force_that_is_missing_would_gain_most_beside_a_refit(with_friction, fitted):

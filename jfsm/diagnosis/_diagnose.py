@@ -29,7 +29,7 @@ from ._lack_of_fit import LackOfFit
 from ._next import Leading
 from ._report import Tested, assemble
 from ._residual import residual, stand_in
-from ._search import LeftBehind, fit_model, refit_from, search, search_akin, search_known, search_pairs
+from ._search import LeftBehind, best_of_each, fit_model, refit_from, search, search_akin, search_known, search_pairs
 from ._trial import Trial
 from ._untold import in_step, untold
 
@@ -227,9 +227,10 @@ class _Study:
         )
         if effects:
             found = search_pairs(effects, trials, known, model, refitted, records, until, tell)
-            trials = [given, refitted, *trials, *(t.beside(refitted).amid(louder) for t in found.trials)]
-            given, refitted, *trials = beside_chance(trials, model, records, until, self.key)
-            behind = [*behind, *found.behind]
+            trials = best_of_each([*trials, *(t.beside(refitted).amid(louder) for t in found.trials)])
+            given, refitted, *trials = beside_chance([given, refitted, *trials], model, records, until, self.key)
+            done = {t.effects for t in trials}
+            behind = [one for one in (*behind, *found.behind) if one.effects not in done]
         return _Searched(given, refitted, trials, behind, left_out, lack)
 
 

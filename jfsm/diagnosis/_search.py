@@ -69,7 +69,7 @@ class Found(NamedTuple):
 
     def and_then(self, found: "Found") -> "Found":
         """With what was found later."""
-        trials = _best_of_each([*self.trials, *found.trials])
+        trials = best_of_each([*self.trials, *found.trials])
         done = {t.effects for t in trials}
         behind = {one.effects: one for one in (*self.behind, *found.behind) if one.effects not in done}
         return Found(trials, list(behind.values()))
@@ -262,7 +262,7 @@ def search_pairs(
 ) -> Found:
     """Pairs of good single causes fitted, then those that share one with the best pair, as long as that changes.
 
-    What is `known` to act is one of the good ones.
+    What is `known` to act is one of the good ones. At last either effect of the best pair is fitted by itself again.
     """
     best = min([refitted, *singles], key=lambda t: t.value)
 
@@ -282,7 +282,16 @@ def search_pairs(
         near = instead(leader, effects, model, records, until)
         near = [c for c in near if c.effects not in done or families(c.effects) == kin]
         found, before = found.and_then(climbed(near, _INSTEAD, kept=kin)), leader
-    return found
+    if not found.trials:
+        return found
+    best_pair = max(found.trials, key=lambda t: t.evidence)
+    return found.and_then(climbed(_each_alone(best_pair, model), _FROM_THERE))
+
+
+def _each_alone(pair: Trial, model: Structure) -> list[Candidate]:
+    """Its effects one by one, from its numbers: by itself either may have stopped on its way, and be enough."""
+    parts = zip(pair.effects, pair.parts, strict=True)
+    return [Candidate((effect,), (model + part,), begin=found_in(pair)) for effect, part in parts]
 
 
 def _climbed(
@@ -311,7 +320,7 @@ def _climbed(
             tell("the best candidates", 2 * len(lots))
             trials += found
         leader = min([leader, *(t.value for t in trials)])
-    trials = _best_of_each(trials)
+    trials = best_of_each(trials)
     done, behind = {t.effects for t in trials}, dict[tuple[Effect, ...], float]()
     for lot in lots:
         for candidate in lot.candidates:
@@ -329,7 +338,7 @@ def _near(lots: Sequence[_Lot], least: int, leader: float = math.inf) -> list[_L
     return [lot for rank, lot in enumerate(ranked) if rank < least or lot.behind < _FAR_BEHIND]
 
 
-def _best_of_each(trials: Sequence[Trial]) -> list[Trial]:
+def best_of_each(trials: Sequence[Trial]) -> list[Trial]:
     """The most probable start of every cause at every place."""
     best: dict[tuple, Trial] = {}
     for t in trials:
