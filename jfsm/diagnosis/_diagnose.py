@@ -220,11 +220,9 @@ class _Study:
         louder = noise_beyond([given, refitted, *trials], records, until)
         trials = [t.amid(louder) for t in (given, refitted, *trials)]
         given, refitted, *trials = beside_chance(trials, model, records, until, self.key)
-        lack = LackOfFit(records, until)
+        lack, alone = LackOfFit(records, until), told([given, refitted, *trials])
         imposed = records[0].path is not None
-        effects = (
-            _beside(told([given, refitted, *trials]), refitted, every, lack, imposed=imposed) if self.pairs else []
-        )
+        effects = _beside(alone, refitted, every, lack, imposed=imposed) if self.pairs else []
         if effects:
             found = search_pairs(effects, trials, known, model, refitted, records, until, tell)
             trials = best_of_each([*trials, *(t.beside(refitted).amid(louder) for t in found.trials)])
