@@ -19,7 +19,7 @@ from ..structures import (
 from ._begin import found_in
 from ._candidates import SHAPES, Candidate, Laws, natural_starts, other_delay
 from ._effect import Effect
-from ._score import gains
+from ._score import Replaced, gains
 from ._trial import Trial
 
 _BASES = 5
@@ -141,7 +141,7 @@ def _beside(
             found.append(_Pair(Candidate(_ordered(effect, other), starts), None))
         elif shapes := laws.placed(other, others):
             placed.append((other, shapes))
-    gained = _gains(base, laws, [shapes for _, shapes in placed], records, until)
+    gained = _gains(base, kept, laws, [shapes for _, shapes in placed], records, until)
     for (other, shapes), nats in zip(placed, gained, strict=True):
         best = sorted(zip(shapes, nats, strict=True), key=lambda one: -one[1])[:SHAPES]
         starts = tuple(_both(model, effect, part, other, shape.term) for shape, _ in best)
@@ -152,13 +152,23 @@ def _beside(
 
 
 def _gains(
-    base: Trial, laws: Laws, placed: Sequence[list[Placed]], records: Sequence[Nuisances], until: Sequence[int]
+    base: Trial,
+    kept: int,
+    laws: Laws,
+    placed: Sequence[list[Placed]],
+    records: Sequence[Nuisances],
+    until: Sequence[int],
 ) -> list[list[float]]:
-    """What each shape of each law promises beside a trial."""
+    """What each shape of each law promises beside one effect of a trial, instead of the other if it has two."""
     if records[0].path is not None or not placed:
         return [[-shape.left for shape in shapes] for shapes in placed]
-    forces = [laws.forces([shape.term for shape in shapes]) for shapes in placed]
-    nats = base.evidence + gains(base, base.posterior(records, until), np.concatenate(forces))
+    replaced = None
+    for part in base.parts[:kept] + base.parts[kept + 1 :]:
+        if isinstance(part, AbstractTerm):
+            paths = base.structure.entries().keys() - laws.structure.entries().keys()
+            replaced = Replaced(laws.forces([part])[0], frozenset(paths))
+    forces = np.concatenate([laws.forces([shape.term for shape in shapes]) for shapes in placed])
+    nats = base.evidence + gains(base, base.posterior(records, until), forces, replaced)
     return [part.tolist() for part in np.split(nats, np.cumsum([len(shapes) for shapes in placed])[:-1])]
 
 

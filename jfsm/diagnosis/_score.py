@@ -30,6 +30,13 @@ class Moved(NamedTuple):
     by_force: np.ndarray
 
 
+class Replaced(NamedTuple):
+    """A part of a trial that something else would replace: its restoring force (n, dof), and its numbers' paths."""
+
+    force: np.ndarray
+    paths: frozenset[str]
+
+
 def moved(trial: Trial, posterior: Posterior, index: int, forces: np.ndarray) -> Moved:
     """What each unknown and each restoring force (forces, n, dof) of unit size does to record `index`."""
     nuisances, theta = posterior.records[index], trial.theta
@@ -68,22 +75,29 @@ def regressed(columns: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, int]
     return wanted - columns @ found, int(rank)
 
 
-def gains(trial: Trial, posterior: Posterior, forces: np.ndarray) -> np.ndarray:
-    """Nats that each restoring force (forces, n, dof) would gain by itself in the first record, of either size.
+def gains(trial: Trial, posterior: Posterior, forces: np.ndarray, instead_of: Replaced | None = None) -> np.ndarray:
+    """Nats that each restoring force (forces, n, dof) would gain by itself in the first record, of whatever size.
 
-    None where it runs away, or would have to act the other way round.
+    None where it runs away, or would have to act the other way round. With a part that is replaced, what is gained by
+    its replacement, and lost with it.
     """
-    size = np.sqrt(np.mean(forces**2, (1, 2)))
+    every = forces if instead_of is None else np.concatenate([instead_of.force[None], forces])
+    size = np.sqrt(np.mean(every**2, (1, 2)))
     told = np.isfinite(size) & (size > 0)
     found = np.zeros(len(forces))
-    if not np.any(told):
+    if not np.any(told) or (instead_of is not None and not told[0]):
         return found
-    unit = forces[told] / size[told, None, None]
+    unit = every[told] / size[told, None, None]
     unit = np.pad(unit, ((0, 0), (0, posterior.records[0].samples - unit.shape[1]), (0, 0)))
     error, by_unknown, by_force = moved(trial, posterior, 0, unit)
+    before = float(np.sum(regressed(by_unknown, error)[0] ** 2))
+    if instead_of is not None:
+        error = error - by_force[:, 0] * size[0] / posterior.records[0].elastic_force(trial.structure)
+        by_unknown = by_unknown[:, [u.path not in instead_of.paths for u in trial.unknowns]]
+        by_force, told = by_force[:, 1:], told[1:]
     left, _ = regressed(by_unknown, np.column_stack([error, by_force]))
     error, by_force = left[:, 0], left[:, 1:]
     with np.errstate(divide="ignore", invalid="ignore"):
-        gained = np.minimum(error @ by_force, 0.0) ** 2 / np.sum(by_force**2, 0) / 2
+        gained = np.minimum(error @ by_force, 0.0) ** 2 / np.sum(by_force**2, 0)
     found[told] = np.nan_to_num(gained, nan=0.0, posinf=0.0)
-    return found
+    return (before - float(np.sum(error**2)) + found) / 2
