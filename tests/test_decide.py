@@ -175,7 +175,7 @@ def test_a_second_effect_must_gain_wherever_the_first_leaves_anything_unless_the
         ("cubic_hardening", 0.0, 0.05, 10.0, False),
         ("cubic_hardening", 3e-4, 0.2, 20.0, False),
         ("accel_bias", 1e-3, 0.2, 120.0, True),  # whatever else is left, no force makes an acceleration's mean
-        ("accel_bias", 1e-3, 0.2, 60.0, False),
+        ("accel_bias", 1e-3, 0.2, 40.0, False),
     ],
 )
 def test_a_second_effect_that_predictions_do_not_tell_is_told_by_evidence(second, left, whiteness, gained, two):

@@ -20,11 +20,11 @@ from jfsm.diagnosis._candidates import (
     special_cases,
 )
 from jfsm.diagnosis._effect import Effect
-from jfsm.diagnosis._pairs import instead, pairs
-from jfsm.diagnosis._score import gains
+from jfsm.diagnosis._pairs import crossed, instead, pairs
+from jfsm.diagnosis._score import Replaced, gains
 from jfsm.diagnosis._search import Found, LeftBehind, fit_model, refit_from, search, search_akin, search_pairs
 from jfsm.identification import Posterior, prepare
-from jfsm.structures import Coulomb, Stribeck, causes
+from jfsm.structures import Coulomb, SineStiffness, Stribeck, causes
 
 MODEL = jfsm.Structure.sdof(1.0, 9.0, 0.3)
 
@@ -166,6 +166,47 @@ def test_the_force_that_is_missing_would_gain_most_beside_a_refit(with_friction,
     assert 0.5 < friction / (best.evidence - refitted.evidence) < 2.0
     assert backwards == runaway == none == 0.0
     assert spring < 0.1 * friction
+
+
+def test_what_would_replace_an_effect_gains_what_that_gained_if_it_is_alike_and_loses_it_if_not(with_friction, fitted):
+    records, until = with_friction
+    found = search(candidates(MODEL, records, chosen_causes(["coulomb"])), MODEL, *fitted, records, until, tell)
+    best = max(found.trials, key=lambda t: t.evidence)
+    laws = Laws(best.structure.without(best.parts[0]), records[0])
+    (force,) = laws.forces(best.parts)
+    tried = [jfsm.Coulomb(0.3, at=(0, 1)), jfsm.CubicStiffness(0.1, at=(0, 1))]
+    forces = np.concatenate([laws.forces([law]) for law in tried])
+    replaced = Replaced(force, frozenset({"coulomb@0-1.F"}))
+    same, spring = gains(best, best.posterior(records, until), forces, replaced)
+    lost = fitted[1].evidence - best.evidence
+    assert lost < -100.0
+    assert abs(same) < 0.05 * abs(lost) and spring < 0.5 * lost
+
+
+def test_effects_of_pairs_alike_are_tried_together_too(with_friction):
+    known, records = causes(), with_friction[0]
+    friction, stribeck = (Effect(known[name], (0, 1)) for name in ("coulomb", "stribeck"))
+    spring, sine = (Effect(known[name], (0, 1)) for name in ("cubic_hardening", "sine_stiffness"))
+    parts = {
+        friction: jfsm.Coulomb(0.8, at=(0, 1)),
+        stribeck: Stribeck(0.8, 0.9, 0.1, at=(0, 1)),
+        spring: jfsm.CubicStiffness(0.2, at=(0, 1)),
+        sine: SineStiffness(1.0, 0.5, at=(0, 1)),
+    }
+
+    def pair(one: Effect, other: Effect, evidence: float) -> Any:
+        (unknowns,) = hypothesis(MODEL, [MODEL + parts[one] + parts[other]], records).unknowns
+        theta = np.full(len(unknowns), evidence / 1000)
+        return SimpleNamespace(
+            effects=(one, other), parts=(parts[one], parts[other]), unknowns=unknowns, theta=theta, evidence=evidence
+        )
+
+    found = [pair(friction, spring, 70.0), pair(stribeck, sine, 60.0), pair(stribeck, spring, 50.0)]
+    (candidate,) = crossed(found, MODEL)
+    assert candidate.effects == (friction, sine)
+    assert candidate.starts[0].terms[-2:] == (parts[friction], parts[sine])
+    (unknowns,) = hypothesis(MODEL, candidate.starts, records, begins=[candidate.begin]).unknowns
+    assert next(u.theta for u in unknowns if u.path == "stiffness@0-1.k") == pytest.approx(0.07)
 
 
 def test_what_is_tried_beside_an_effect_begins_where_that_left_all_other_numbers(with_friction):

@@ -265,10 +265,14 @@ class Laws:
         placed = self.placed(effect)
         starts = [self.structure + start.term for start in placed[:SHAPES] if start.share is not None]
         starts += [self.structure + term for term in self._otherwise_directed(placed)]
-        if len(effect.cause.effect.parameters) == 1:  # an ill seen missing force may not show its size
-            natural = natural_starts(self.structure, *effect, self.nuisances)
-            starts += natural[: min(SHAPES, lanes_of(natural[0])) - len(starts)]
+        starts += [self.structure + term for term in self.natural(effect)][: SHAPES - len(starts)]
         return Candidate((effect,), tuple(starts), placed[0].share if placed else 0.0)
+
+    def natural(self, effect: Effect) -> list[AbstractTerm]:
+        """The law at natural sizes, where it has nothing but a size: an ill seen missing force may not show it."""
+        if len(effect.cause.effect.parameters) > 1 or lanes_of(self.structure + self._law(effect)) == 1:
+            return []
+        return [start.terms[-1] for start in natural_starts(self.structure, *effect, self.nuisances)]
 
     def _otherwise_directed(self, placed: Sequence[Placed]) -> list[AbstractTerm]:
         """The best shape with its sign changed, of a load whose force and motion nothing but an acceleration tells."""

@@ -16,6 +16,9 @@ WORTH_A_SECOND = 0.03
 MAY_HIDE = (ForceGain, AccelerationGain, Preload, AccelerationBias)
 """Effects that own values and offsets may stand for."""
 
+_NEAR = 0.01
+"""Distance to the farthest own value, as a share of it, from which a value is there."""
+
 
 def settled(trials: Sequence[Trial], refitted: Trial) -> bool:
     """Whether the best of them leaves nothing but noise, or one explains nearly all; its laws what they are called."""
@@ -28,6 +31,18 @@ def settled(trials: Sequence[Trial], refitted: Trial) -> bool:
 def is_itself(t: Trial) -> bool:
     """Whether none of its laws is, with the numbers found, another one."""
     return not any(law.otherwise(t.structure.stiffness_of(law.at)) for law in t.laws)
+
+
+def far_off(trial: Trial) -> set[str]:
+    """Own values of a trial that went as far as they may: it is another structure's force that they make up for.
+
+    So it is with a sensor's fault. Damping may go: a model without friction often states as viscous what friction
+    takes.
+    """
+    faults = {effect.cause.effect.kind for effect in trial.effects if effect.cause.is_sensor}
+    own = [*own_values(trial), *((u, theta) for u, theta in ended(trial) if u.path.split("@")[0] in faults)]
+    low = {u.path for u, theta in own if theta < u.low + _NEAR and not u.path.startswith("damping@")}
+    return low | {u.path for u, theta in own if theta > u.high - _NEAR}
 
 
 def something_left(

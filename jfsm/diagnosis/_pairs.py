@@ -1,7 +1,7 @@
 """Two effects at once, where one leaves something: not the best one and then the next, but pairs of good ones."""
 
 from collections.abc import Sequence
-from itertools import combinations
+from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ from ..structures import (
 from ._begin import found_in
 from ._candidates import SHAPES, Candidate, Laws, natural_starts, other_delay
 from ._effect import Effect
+from ._enough import far_off
 from ._score import Replaced, gains
 from ._trial import Trial
 
@@ -58,7 +59,7 @@ def pairs(
     found: list[_Pair] = []
     families: list[str] = []
     surely = () if known is None else known.effects
-    for base in sorted(singles, key=lambda t: (t.effects != surely, -t.evidence)):
+    for base in sorted(singles, key=lambda t: (t.effects != surely, bool(far_off(t)), -t.evidence)):
         family = base.effects[0].cause.family
         if family in families or len(families) == _BASES:
             continue
@@ -107,6 +108,19 @@ def instead(
     return [c for c in found if set(c.effects) != set(pair.effects)]
 
 
+def crossed(found: Sequence[Trial], model: Structure) -> list[Candidate]:
+    """Pairs of an effect of one of these and one of another, all of the same families, that are not among them."""
+    done, tried = {t.effects for t in found}, dict[tuple, Candidate]()
+    for first, second in product(found, found):
+        one, other = first.effects[0], second.effects[1]
+        effects = _ordered(one, other)
+        if effects not in done and effects not in tried and _are_two(one, other):
+            start = _both(model, one, first.parts[0], other, second.parts[1])
+            better = max(first, second, key=lambda t: t.evidence)
+            tried[effects] = Candidate(effects, (start,), begin=found_in(better))
+    return list(tried.values())
+
+
 def _best(found: Sequence[_Pair], most: int) -> list[_Pair]:
     """Those that promise most."""
     told = [(-pair.promise, i) for i, pair in enumerate(found) if pair.promise is not None]
@@ -144,7 +158,8 @@ def _beside(
     gained = _gains(base, kept, laws, [shapes for _, shapes in placed], records, until)
     for (other, shapes), nats in zip(placed, gained, strict=True):
         best = sorted(zip(shapes, nats, strict=True), key=lambda one: -one[1])[:SHAPES]
-        starts = tuple(_both(model, effect, part, other, shape.term) for shape, _ in best)
+        terms = [shape.term for shape, _ in best] + laws.natural(other)
+        starts = tuple(_both(model, effect, part, other, term) for term in terms[:SHAPES])
         shape, most = best[0]
         promise = None if shape.share is None else most
         found.append(_Pair(Candidate(_ordered(effect, other), starts, begin=begin), promise))

@@ -14,8 +14,8 @@ from ._adequacy import GATE, SIGNIFICANT, explained
 from ._begin import Begin, found_in, own_part
 from ._candidates import Candidate, hypothesis, late_instead, resting, special_cases
 from ._effect import Effect, families
-from ._enough import is_itself
-from ._pairs import instead, pairs
+from ._enough import far_off, is_itself
+from ._pairs import crossed, instead, pairs
 from ._trial import Trial, trial
 
 _FAR_BEHIND = 200.0
@@ -49,7 +49,8 @@ _INSTEAD = _TOGETHER._replace(to_the_end=True)
 """Of those that share an effect with the best pair,"""
 _ROUNDS = 3
 """which are looked for so many times, at most."""
-
+_ALIKE = 20.0
+"""Nats behind the best pair up to which effects of others of its families are tried together, too."""
 _FROM_THERE = _Way(LADDER[-1:], 1, 1.0)
 """From numbers of what is akin."""
 
@@ -272,7 +273,8 @@ def search_pairs(
 
     found, before = climbed(pairs(singles, known, effects, model, records, until), _TOGETHER), best
     for _ in range(_ROUNDS):
-        leader = max((t for t in found.trials if is_itself(t)), key=lambda t: t.evidence, default=best)
+        possible = [t for t in found.trials if is_itself(t) and far_off(t) <= far_off(refitted)]
+        leader = max(possible, key=lambda t: t.evidence, default=best)
         gained = leader.evidence - before.evidence
         if gained < SIGNIFICANT and (before is not best or explained(leader, best) < GATE):
             break
@@ -285,7 +287,10 @@ def search_pairs(
     if not found.trials:
         return found
     best_pair = max(found.trials, key=lambda t: t.evidence)
-    return found.and_then(climbed(_each_alone(best_pair, model), _FROM_THERE))
+    kin = families(best_pair.effects)
+    alike = [t for t in found.trials if families(t.effects) == kin and best_pair.evidence - t.evidence < _ALIKE]
+    tried = crossed(alike, model) + _each_alone(best_pair, model)
+    return found.and_then(climbed(tried, _FROM_THERE, kept=kin))
 
 
 def _each_alone(pair: Trial, model: Structure) -> list[Candidate]:

@@ -7,26 +7,24 @@ import numpy as np
 
 from ..structures import AccelerationBias, Preload
 from ._adequacy import GATE, NEGLIGIBLE, SIGNIFICANT, adequate, explained, unexplained
-from ._enough import MAY_HIDE, WORTH_A_SECOND, hidden, strain
-from ._trial import Trial, ended, own_values
+from ._enough import MAY_HIDE, WORTH_A_SECOND, far_off, hidden, strain
+from ._trial import Trial
 
 _SECOND = 15.0
 """Nats by which two effects must beat either of them alone."""
 _WORTH_TO_NOISE = 0.01
 """Share of the refit's error by which two effects that leave noise only must predict better than either alone."""
-_BIAS = 100.0
+_BIAS = 50.0
 """Nats by which a bias must beat an offset that stands for it where both leave something."""
 UNPREDICTED = 15.0
 """Nats by which a cause must beat a refit whose predictions leave nothing: of many, one gains some by chance."""
 _UNSEEN = 0.1
 """Nats by which a law must beat a special case of it for its further numbers to be seen."""
-_NEAR = 0.01
-"""Distance to the farthest own value, as a share of it, from which a value is there."""
 
 
 def why_not(t: Trial, tried: Sequence[Trial], given: Trial, refitted: Trial) -> str:
     """Why a candidate is no alternative to the model and to the others that were `tried`, or nothing."""
-    return _reason(t, given, refitted) or _needs_both(t, tried, refitted)
+    return _reason(t, given, refitted) or _needs_both(t, tried, refitted) or _has_a_bias(t, tried)
 
 
 def special_case(winner: Trial, passing: Sequence[Trial]) -> Trial | None:
@@ -39,18 +37,6 @@ def special_case(winner: Trial, passing: Sequence[Trial]) -> Trial | None:
     return max(cases, key=lambda t: t.evidence, default=None)
 
 
-def _far_off(trial: Trial) -> set[str]:
-    """Own values of a trial that went as far as they may: it is another structure's force that they make up for.
-
-    So it is with a sensor's fault. Damping may go: a model without friction often states as viscous what friction
-    takes.
-    """
-    faults = {effect.cause.effect.kind for effect in trial.effects if effect.cause.is_sensor}
-    own = [*own_values(trial), *((u, theta) for u, theta in ended(trial) if u.path.split("@")[0] in faults)]
-    low = {u.path for u, theta in own if theta < u.low + _NEAR and not u.path.startswith("damping@")}
-    return low | {u.path for u, theta in own if theta > u.high - _NEAR}
-
-
 def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
     """Why a candidate is no alternative, or nothing."""
     over_refit, over_given = explained(t, refitted), explained(t, given)
@@ -59,7 +45,7 @@ def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
     for law in t.laws:
         if other := law.otherwise(t.structure.stiffness_of(law.at)):
             return other
-    if far := _far_off(t) - _far_off(refitted):
+    if far := far_off(t) - far_off(refitted):
         return f"takes {' and '.join(sorted(far))} as far from what the model states as they may be"
     # A gain error and own values that are all off by the same share predict the same readings: only what is believed
     # beforehand weighs them, so such a candidate need not beat the refit by a margin, nor leave less.
@@ -93,6 +79,12 @@ def _hides(t: Trial, alone: Trial) -> bool:
     these tells them. Where one alone leaves something it is hard to believe that they hide it."""
     kinds = MAY_HIDE if adequate(alone) else hidden([alone])
     return alone.prediction.left < NEGLIGIBLE and _adds(t, alone) in kinds
+
+
+def _has_a_bias(t: Trial, tried: Sequence[Trial]) -> str:
+    """Why one effect alone is no alternative to the same with a bias, or nothing."""
+    pairs = [pair for pair in tried if len(pair.effects) > 1 and set(t.effects) < set(pair.effects)]
+    return "holds only with an offset that is a bias" if any(_shows_as_a_bias(pair, t) for pair in pairs) else ""
 
 
 def _shows_as_a_bias(t: Trial, alone: Trial) -> bool:
