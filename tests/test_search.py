@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jfsm
-from jfsm.diagnosis._begin import Start, begun
+from jfsm.diagnosis._begin import Begin, Start, begun
 from jfsm.diagnosis._candidates import (
     Candidate,
     Laws,
@@ -30,7 +30,7 @@ MODEL = jfsm.Structure.sdof(1.0, 9.0, 0.3)
 
 
 def test_a_special_case_begins_from_the_numbers_of_the_law_that_holds_it():
-    begin = {("stiffness@0-1.k", None): Start(8.0, 9.0)}
+    begin: Begin = {("stiffness@0-1.k", None): Start(8.0, 9.0)}
     coulomb = Candidate((Effect(causes()["coulomb"], (0, 1)),), (MODEL + Coulomb(0.3, at=(0, 1)),))
     spring = Candidate((Effect(causes()["cubic_hardening"], (0, 1)),), (MODEL + jfsm.CubicStiffness(1.0, at=(0, 1)),))
     (case,) = special_cases(Stribeck(2.0, 2.5, 0.1, at=(0, 1)), begin, [coulomb, spring])
@@ -47,7 +47,7 @@ def test_an_early_channel_is_a_late_other_one():
 
     force, channel = delay("force_delay", ("force", 1)), delay("channel_delay", ("displacement", 1))
     early = jfsm.ForceDelay(-0.04, at=("force", 1))
-    begin = {("stiffness@0-1.k", None): Start(8.0, 9.0)}
+    begin: Begin = {("stiffness@0-1.k", None): Start(8.0, 9.0)}
     (late,) = late_instead(early, begin, [force, channel], MODEL)
     assert late.effects == (channel,)
     assert late.starts[0].values() == MODEL.values() | {"channel_delay@displacement-1.tau": 0.04}
@@ -138,14 +138,15 @@ def found_beside_friction(records: Any, *parts: Any, cause: str) -> Any:
 
 
 def test_a_single_effect_that_stopped_on_its_way_is_fitted_again_from_the_best_pair_that_has_it(with_friction, fitted):
+    given, refitted = fitted
     records, until = with_friction
     every = candidates(MODEL, records, chosen_causes(["cubic_hardening", "coulomb"]))
     spring, friction = (
         next(c for c in every if c.effects[0].cause.id == name) for name in ("cubic_hardening", "coulomb")
     )
-    alone = search([spring], MODEL, *fitted, records, until, tell).trials
+    alone = search([spring], MODEL, given, refitted, records, until, tell).trials
     effects = [*spring.effects, *friction.effects]
-    found = search_pairs(effects, alone, None, MODEL, fitted[1], records, until, tell)
+    found = search_pairs(effects, alone, None, MODEL, refitted, records, until, tell)
     (again,) = (t for t in found.trials if t.effects == friction.effects)
     assert abs(again.structure.values()["coulomb@0-1.F"] - 0.8) < 0.05
     assert again.evidence > max(t.evidence for t in alone) + 100.0
@@ -153,14 +154,16 @@ def test_a_single_effect_that_stopped_on_its_way_is_fitted_again_from_the_best_p
 
 def test_the_force_that_is_missing_would_gain_most_beside_a_refit(with_friction, fitted):
     records, until = with_friction
-    _, refitted = fitted
+    given, refitted = fitted
     laws = Laws(refitted.structure, records[0])
     tried = [jfsm.Coulomb(0.3, at=(0, 1)), jfsm.CubicStiffness(0.1, at=(0, 1))]
     forces = np.concatenate([laws.forces([law]) for law in tried])
     forces = np.concatenate([forces, -forces[:1], np.full_like(forces[:1], np.nan), np.zeros_like(forces[:1])])
     friction, spring, backwards, runaway, none = gains(refitted, refitted.posterior(records, until), forces)
     best = max(
-        search(candidates(MODEL, records, chosen_causes(["coulomb"])), MODEL, *fitted, records, until, tell).trials,
+        search(
+            candidates(MODEL, records, chosen_causes(["coulomb"])), MODEL, given, refitted, records, until, tell
+        ).trials,
         key=lambda t: t.evidence,
     )
     assert 0.5 < friction / (best.evidence - refitted.evidence) < 2.0
@@ -169,16 +172,17 @@ def test_the_force_that_is_missing_would_gain_most_beside_a_refit(with_friction,
 
 
 def test_what_would_replace_an_effect_gains_what_that_gained_if_it_is_alike_and_loses_it_if_not(with_friction, fitted):
+    given, refitted = fitted
     records, until = with_friction
-    found = search(candidates(MODEL, records, chosen_causes(["coulomb"])), MODEL, *fitted, records, until, tell)
+    found = search(candidates(MODEL, records, chosen_causes(["coulomb"])), MODEL, given, refitted, records, until, tell)
     best = max(found.trials, key=lambda t: t.evidence)
     laws = Laws(best.structure.without(best.parts[0]), records[0])
-    (force,) = laws.forces(best.parts)
+    (force,) = laws.forces(best.laws)
     tried = [jfsm.Coulomb(0.3, at=(0, 1)), jfsm.CubicStiffness(0.1, at=(0, 1))]
     forces = np.concatenate([laws.forces([law]) for law in tried])
     replaced = Replaced(force, frozenset({"coulomb@0-1.F"}))
     same, spring = gains(best, best.posterior(records, until), forces, replaced)
-    lost = fitted[1].evidence - best.evidence
+    lost = refitted.evidence - best.evidence
     assert lost < -100.0
     assert abs(same) < 0.05 * abs(lost) and spring < 0.5 * lost
 
@@ -224,7 +228,7 @@ def test_a_number_begins_where_it_is_said_to_and_is_believed_there(with_friction
     records, _ = with_friction
     (refit,) = hypothesis(MODEL, [MODEL], records).unknowns
     (offset,) = (u for u in refit if u.path == "offset@displacement-1.b")
-    of_all = {("offset@displacement-1.b", None): Start(5.0, 4.0)}
+    of_all: Begin = {("offset@displacement-1.b", None): Start(5.0, 4.0)}
     moved = begun(offset, of_all)
     assert moved.value(moved.theta) == pytest.approx(5.0) and moved.value(moved.center) == pytest.approx(4.0)
     mine = begun(offset, of_all | {("offset@displacement-1.b", 0): Start(1.0, 2.0)})
