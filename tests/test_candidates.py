@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import jfsm
+from jfsm.diagnosis._begin import Begin, Start
 from jfsm.diagnosis._candidates import Candidate, candidates, chosen_causes, contained, hypothesis, own_paths, resting
 from jfsm.diagnosis._effect import Effect
 from jfsm.identification import Nuisances, prepare
@@ -84,11 +85,12 @@ def test_a_quadratic_spring_about_a_rest_that_nothing_tells_is_a_well_of_two(cha
     found = jfsm.Structure.sdof(2.1, 18.0 + slope, 0.6) + jfsm.QuadraticStiffness(curvature, at=(0, 1))
     seen: Any = SimpleNamespace(at_rest=False, path=None, channels=((channel, 1),))
     among = [Candidate((Effect(jfsm.causes()[cause], (0, 1)),), ()) for cause in ("double_well", "cubic_hardening")]
-    cases = resting(found, found.terms[-1], among, model, seen)
+    begin: Begin = {("mass@1", None): Start(2.1, 2.0), ("stiffness@0-1.k", None): Start(0.0, 18.0)}
+    cases = resting(found, found.terms[-1], begin, among, model, seen)
     assert bool(cases) == tried
     for case in cases:
-        assert case.effects[0].cause.id == "double_well" and case.own is not None
+        assert case.effects[0].cause.id == "double_well" and case.begin is not None
         np.testing.assert_allclose(case.starts[0].terms[-1].values, well.values)
-        assert (
-            case.own["x0@1"] == pytest.approx(rest) and case.own["mass@1"] == 2.1 and "stiffness@0-1.k" not in case.own
-        )
+        assert case.begin.keys() == {("x0@1", None), ("mass@1", None)}
+        assert case.begin["x0@1", None] == (pytest.approx(rest), pytest.approx(rest))
+        assert case.begin["mass@1", None] == begin["mass@1", None]

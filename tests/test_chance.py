@@ -10,6 +10,7 @@ import jfsm
 from jfsm.demo import DAMPING, FRICTION, MASS, STIFFNESS, hidden_friction
 from jfsm.diagnosis._adequacy import NEGLIGIBLE, adequate
 from jfsm.diagnosis._chance import beside_chance, noise_beyond
+from jfsm.diagnosis._problem import Problem
 from jfsm.diagnosis._search import fit_model
 from jfsm.diagnosis._trial import Trial
 from jfsm.identification import prepare_all
@@ -28,7 +29,7 @@ def judged(record: jfsm.Record, stiffness: float) -> tuple[Trial, Trial]:
     """A model that rubs, as the record does, before and after what noise leaves of it is drawn."""
     model = jfsm.Structure.sdof(MASS, stiffness, DAMPING) + Coulomb(FRICTION, at=(0, 1))
     records = prepare_all([record], model)
-    given, _ = fit_model(model, records, UNTIL)
+    given, _ = fit_model(Problem(model, records, UNTIL))
     # A model whose values are off is told by its innovations too; here what it leaves has to tell alone.
     given = replace(given, whiteness=0.0, noise=np.where(given.trusted, 0.0, given.noise))
     (drawn,) = beside_chance([given], model, records, UNTIL, jax.random.key(1))
@@ -53,7 +54,7 @@ def test_noise_is_no_excuse_for_a_value_that_is_off(record):
 def test_white_innovations_tell_the_noise_of_a_channel_that_gave_but_a_guess(record):
     model = jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING) + Coulomb(FRICTION, at=(0, 1))
     records = prepare_all([record], model)
-    given, refitted = fit_model(model, records, UNTIL)
+    given, refitted = fit_model(Problem(model, records, UNTIL))
     louder = 2 * np.log(3.0)  # three times the noise
     theta = np.array([louder if u.path == "noise@1" else t for u, t in zip(given.unknowns, given.theta, strict=True)])
     guessed = np.array([True, False, True])

@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 import jfsm
 from jfsm.diagnosis._lack_of_fit import LackOfFit
+from jfsm.diagnosis._problem import Problem
 from jfsm.diagnosis._search import fit_model
 from jfsm.identification import prepare_all
 from jfsm.structures import CubicStiffness
@@ -40,7 +41,7 @@ def told(law: Callable[[float, float], float], channel: str, seed: int) -> float
     spring = CubicStiffness(CUBIC, at=(0, 1))
     model = (jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING) + spring).uncertain(cubic_stiffness=0.5)
     records = prepare_all([record], model)
-    _, refitted = fit_model(model, records, [UNTIL])
+    _, refitted = fit_model(Problem(model, records, [UNTIL]))
     return LackOfFit(records, [UNTIL])(refitted).nats
 
 

@@ -21,6 +21,7 @@ from jfsm.diagnosis._candidates import (
 )
 from jfsm.diagnosis._effect import Effect
 from jfsm.diagnosis._pairs import crossed, instead, pairs
+from jfsm.diagnosis._problem import Problem
 from jfsm.diagnosis._score import Replaced, gains
 from jfsm.diagnosis._search import Found, LeftBehind, fit_model, refit_from, search, search_akin, search_pairs
 from jfsm.identification import Posterior, prepare
@@ -71,13 +72,13 @@ def with_friction():
     x = solve_ivp(rate, (0, time[-1]), [0.0, 0.0], t_eval=time, method="LSODA", rtol=1e-8, atol=1e-10).y[0]
     noise = 0.01 * np.random.default_rng(1).standard_normal((2, time.size))
     record = jfsm.Record(time, force(time) + 4 * noise[0], x + np.std(x) * noise[1], at_rest=True)
-    return [prepare(record, MODEL)], [time.size]
+    return Problem(MODEL, [prepare(record, MODEL)], [time.size])
 
 
 @pytest.fixture(scope="module")
 def fitted(with_friction):
     """The model as given and refitted."""
-    return fit_model(MODEL, *with_friction)
+    return fit_model(with_friction)
 
 
 def tell(what, steps):
@@ -85,13 +86,13 @@ def tell(what, steps):
 
 
 def test_a_special_case_that_stopped_on_its_way_is_fitted_from_the_law_that_holds_it(with_friction, fitted):
-    every = candidates(MODEL, with_friction[0], chosen_causes(["stribeck", "coulomb"]))
+    every = candidates(MODEL, with_friction.records, chosen_causes(["stribeck", "coulomb"]))
     stribeck, coulomb = (next(c for c in every if c.effects[0].cause.id == name) for name in ("stribeck", "coulomb"))
     given, refitted = fitted
-    records, until = with_friction
-    alone = search([stribeck], MODEL, given, refitted, records, until, tell)
+    _, records, until = with_friction
+    alone = search([stribeck], given, refitted, with_friction, tell)
     stopped = Found(alone.trials, [LeftBehind(coulomb.effects, 613.0)])
-    found = search_akin(alone.trials, every, stopped, MODEL, records, until, tell)
+    found = search_akin(alone.trials, every, stopped, with_friction, tell)
     evidence = {t.effects[0].cause.id: t.evidence for t in found.trials}
     assert found.behind == []
     assert 0.0 < evidence["coulomb"] - evidence["stribeck"] < 10.0
@@ -104,12 +105,12 @@ def test_a_refit_that_stopped_on_its_way_is_climbed_again_from_own_values_found_
     (stiffness,) = (i for i, u in enumerate(refitted.unknowns) if u.path == "stiffness@0-1.k")
     beside = replace(refitted, theta=np.where(np.arange(refitted.theta.size) == stiffness, np.log(8.9 / 9.0), 0.0))
     stopped = replace(refitted, evidence=refitted.evidence - 17.0)
-    again = refit_from([beside], stopped, MODEL, *with_friction)
+    again = refit_from([beside], stopped, with_friction)
     assert again.label == "refitted" and again.effects == ()
     assert abs(again.evidence - refitted.evidence) < 0.1
     better = replace(refitted, evidence=refitted.evidence + 17.0)
-    assert refit_from([beside], better, MODEL, *with_friction) is better
-    assert refit_from([], stopped, MODEL, *with_friction) is stopped
+    assert refit_from([beside], better, with_friction) is better
+    assert refit_from([], stopped, with_friction) is stopped
 
 
 def found_beside_friction(records: Any, *parts: Any, cause: str) -> Any:
@@ -139,21 +140,21 @@ def found_beside_friction(records: Any, *parts: Any, cause: str) -> Any:
 
 def test_a_single_effect_that_stopped_on_its_way_is_fitted_again_from_the_best_pair_that_has_it(with_friction, fitted):
     given, refitted = fitted
-    records, until = with_friction
+    _, records, until = with_friction
     every = candidates(MODEL, records, chosen_causes(["cubic_hardening", "coulomb"]))
     spring, friction = (
         next(c for c in every if c.effects[0].cause.id == name) for name in ("cubic_hardening", "coulomb")
     )
-    alone = search([spring], MODEL, given, refitted, records, until, tell).trials
+    alone = search([spring], given, refitted, with_friction, tell).trials
     effects = [*spring.effects, *friction.effects]
-    found = search_pairs(effects, alone, None, MODEL, refitted, records, until, tell)
+    found = search_pairs(effects, alone, None, refitted, with_friction, tell)
     (again,) = (t for t in found.trials if t.effects == friction.effects)
     assert abs(again.structure.values()["coulomb@0-1.F"] - 0.8) < 0.05
     assert again.evidence > max(t.evidence for t in alone) + 100.0
 
 
 def test_the_force_that_is_missing_would_gain_most_beside_a_refit(with_friction, fitted):
-    records, until = with_friction
+    _, records, until = with_friction
     given, refitted = fitted
     laws = Laws(refitted.structure, records[0])
     tried = [jfsm.Coulomb(0.3, at=(0, 1)), jfsm.CubicStiffness(0.1, at=(0, 1))]
@@ -161,9 +162,7 @@ def test_the_force_that_is_missing_would_gain_most_beside_a_refit(with_friction,
     forces = np.concatenate([forces, -forces[:1], np.full_like(forces[:1], np.nan), np.zeros_like(forces[:1])])
     friction, spring, backwards, runaway, none = gains(refitted, refitted.posterior(records, until), forces)
     best = max(
-        search(
-            candidates(MODEL, records, chosen_causes(["coulomb"])), MODEL, given, refitted, records, until, tell
-        ).trials,
+        search(candidates(MODEL, records, chosen_causes(["coulomb"])), given, refitted, with_friction, tell).trials,
         key=lambda t: t.evidence,
     )
     assert 0.5 < friction / (best.evidence - refitted.evidence) < 2.0
@@ -173,8 +172,8 @@ def test_the_force_that_is_missing_would_gain_most_beside_a_refit(with_friction,
 
 def test_what_would_replace_an_effect_gains_what_that_gained_if_it_is_alike_and_loses_it_if_not(with_friction, fitted):
     given, refitted = fitted
-    records, until = with_friction
-    found = search(candidates(MODEL, records, chosen_causes(["coulomb"])), MODEL, given, refitted, records, until, tell)
+    _, records, until = with_friction
+    found = search(candidates(MODEL, records, chosen_causes(["coulomb"])), given, refitted, with_friction, tell)
     best = max(found.trials, key=lambda t: t.evidence)
     laws = Laws(best.structure.without(best.parts[0]), records[0])
     (force,) = laws.forces(best.laws)
@@ -188,7 +187,7 @@ def test_what_would_replace_an_effect_gains_what_that_gained_if_it_is_alike_and_
 
 
 def test_effects_of_pairs_alike_are_tried_together_too(with_friction):
-    known, records = causes(), with_friction[0]
+    known, records = causes(), with_friction.records
     friction, stribeck = (Effect(known[name], (0, 1)) for name in ("coulomb", "stribeck"))
     spring, sine = (Effect(known[name], (0, 1)) for name in ("cubic_hardening", "sine_stiffness"))
     parts = {
@@ -214,9 +213,9 @@ def test_effects_of_pairs_alike_are_tried_together_too(with_friction):
 
 
 def test_what_is_tried_beside_an_effect_begins_where_that_left_all_other_numbers(with_friction):
-    records, _ = with_friction
+    records = with_friction.records
     base, spring = found_beside_friction(records, cause="coulomb"), Effect(causes()["cubic_hardening"], (0, 1))
-    (pair,) = pairs([base], None, [spring], MODEL, *with_friction)
+    (pair,) = pairs([base], None, [spring], with_friction)
     (unknowns,) = hypothesis(MODEL, pair.starts[:1], records, begins=[pair.begin]).unknowns
     others = {u.path: u for u in unknowns if not u.path.startswith(("coulomb", "cubic"))}
     assert {"stiffness@0-1.k", "offset@force-1.b", "offset@displacement-1.b", "noise@0"} < others.keys()
@@ -225,7 +224,7 @@ def test_what_is_tried_beside_an_effect_begins_where_that_left_all_other_numbers
 
 
 def test_a_number_begins_where_it_is_said_to_and_is_believed_there(with_friction):
-    records, _ = with_friction
+    records = with_friction.records
     (refit,) = hypothesis(MODEL, [MODEL], records).unknowns
     (offset,) = (u for u in refit if u.path == "offset@displacement-1.b")
     of_all: Begin = {("offset@displacement-1.b", None): Start(5.0, 4.0)}
@@ -237,8 +236,8 @@ def test_a_number_begins_where_it_is_said_to_and_is_believed_there(with_friction
 
 
 def test_a_constant_force_beside_another_effect_begins_as_what_the_offset_of_the_force_is(with_friction):
-    base, preload = found_beside_friction(with_friction[0], cause="coulomb"), Effect(causes()["preload"], (0, 1))
-    (pair,) = pairs([base], None, [preload], MODEL, *with_friction)
+    base, preload = found_beside_friction(with_friction.records, cause="coulomb"), Effect(causes()["preload"], (0, 1))
+    (pair,) = pairs([base], None, [preload], with_friction)
     assert {effect.cause.id for effect in pair.effects} == {"coulomb", "preload"}
     assert pair.starts[0].values()["preload@0-1.F"] == -0.3  # a reading too large by 0.3 is a force the other way
 
@@ -246,8 +245,8 @@ def test_a_constant_force_beside_another_effect_begins_as_what_the_offset_of_the
 def test_beside_another_effect_an_early_channel_is_a_late_other_one_too(with_friction):
     early = jfsm.ForceDelay(-0.04, at=("force", 1))
     late = Effect(causes()["channel_delay"], ("displacement", 1))
-    pair = found_beside_friction(with_friction[0], early, cause="force_delay")
-    found = instead(pair, [*pair.effects, late], MODEL, *with_friction)
+    pair = found_beside_friction(with_friction.records, early, cause="force_delay")
+    found = instead(pair, [*pair.effects, late], with_friction)
     starts = [start.values() for c in found for start in c.starts if late in c.effects]
     assert 0.04 in [values["channel_delay@displacement-1.tau"] for values in starts]
     assert all(values["coulomb@0-1.F"] == 0.8 for values in starts)

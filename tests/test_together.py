@@ -9,6 +9,7 @@ from references import driven_readings
 import jfsm
 from jfsm.diagnosis._candidates import Candidate, candidates, chosen_causes
 from jfsm.diagnosis._pairs import pairs
+from jfsm.diagnosis._problem import Problem
 from jfsm.identification import missing_force, place, place_together, prepare, scale_of
 
 T = np.arange(1200) * 0.06
@@ -81,9 +82,11 @@ def test_pairs_are_tried_that_explain_most_together_whatever_each_explains_alone
     nuisances = prepare(record(stopped_and_damped), MODEL)
     chosen = chosen_causes(("end_stop", "quadratic_damping", "coulomb", "quadratic_stiffness", "force_gain"))
     every: list[Candidate] = candidates(MODEL, [nuisances], chosen)
-    tried = pairs(
-        [], None, [effect for one in every for effect in one.effects], MODEL, [nuisances], [nuisances.samples]
+    effects, problem = (
+        [effect for one in every for effect in one.effects],
+        Problem(MODEL, [nuisances], [nuisances.samples]),
     )
+    tried = pairs([], None, effects, problem)
     first = tried[0]
     assert {effect.cause.id for effect in first.effects} == {"end_stop", "quadratic_damping"}
     assert [type(term) for term in first.starts[0].terms[-2:]] == [e.cause.effect for e in first.effects]

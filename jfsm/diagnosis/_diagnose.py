@@ -27,6 +27,7 @@ from ._gain import Gain, measure_gain
 from ._holdout import HeldOut, split
 from ._lack_of_fit import LackOfFit
 from ._next import Leading
+from ._problem import Problem
 from ._report import Tested, assemble
 from ._residual import residual, stand_in
 from ._search import LeftBehind, best_of_each, fit_model, refit_from, search, search_akin, search_known, search_pairs
@@ -111,12 +112,12 @@ def diagnose(
         training, held = split(record, holdout, first=True)
         studied = study.of(training, known=studied)
         assert not isinstance(studied, Trial)
-    records, until, every, found = studied
+    problem, every, found = studied
     steps.next("the verdict")
-    records, found, decision = _decided(found, records, until)
+    problem, found, decision = _decided(found, problem)
     if clipped:
         decision = beside_clipping(decision, clipped, found.refitted)
-    first, refitted = records[0], found.refitted
+    first, fitted, refitted = problem.first, problem.until[0], found.refitted
 
     steps.next("the gain on held-out readings")
     decision, extended, gain, runs = _confirmed(decision, refitted, model, stated, held, first, key)
@@ -125,16 +126,16 @@ def diagnose(
     # Shown beside a law is the force that it stands for, with the own values that go with it.
     lacking = refitted.structure if term is None else decision.winner.structure.without(term)
     at = term.at if term is not None and term.at in lacking.links else None
-    missing = residual(lacking, first, until[0], at)
-    silence = Silence(found.given, refitted, model, records, until)
+    missing = residual(lacking, first, fitted, at)
+    silence = Silence(found.given, refitted, model, problem.records, problem.until)
     steps.next("what would have been seen")
     if decision.verdict in ("consistent", "undecided"):  # silence is worth what would have been heard
         seen = naturally_detectable(every, silence)
     else:
         seen = detectable(found.trials, silence)
     tested = Tested(found.trials, found.behind, found.left_out, seen, found.lack.known)
-    leading = Leading.of(model, [refitted, *found.trials], decision.share, first, until[0])
-    return assemble(decision, clipped, refitted, tested, model, extended, records, missing, gain, runs, leading)
+    leading = Leading.of(model, [refitted, *found.trials], decision.share, first, fitted)
+    return assemble(decision, clipped, refitted, tested, model, extended, problem.records, missing, gain, runs, leading)
 
 
 @dataclass(frozen=True)
@@ -167,33 +168,32 @@ class _Study:
 
     def of(
         self, training: Sequence[tuple[Record, int]], *, unless_later: bool = False, known: Trial | None = None
-    ) -> tuple[list[Nuisances], list[int], list[Candidate], _Searched] | Trial:
-        """Records as the likelihood sees them, how many samples are fitted, what could be tried, what was found.
+    ) -> tuple[Problem, list[Candidate], _Searched] | Trial:
+        """What is fitted to, what could be tried, what was found.
 
         Where what is lacking shows in what was kept back, which then has to be fitted, the best single trial beside
         which it does, `unless_later`; that is `known` then.
         """
-        records, until, given, refitted = _believed(training, self.model, self.reconstruction)
+        problem, given, refitted = _believed(training, self.model, self.reconstruction)
         if unless_later and _later(refitted, NEGLIGIBLE):
             return refitted
-        every = candidates(self.model, records, self.chosen, self.places)
-        found = self._searched(every, given, refitted, records, until, known)
+        every = candidates(self.model, problem.records, self.chosen, self.places)
+        found = self._searched(every, given, refitted, known, problem)
         best = max(found.every, key=lambda t: t.evidence)
         if unless_later and _later(best, MUCH):
             return max((t for t in found.every if len(t.effects) < 2), key=lambda t: t.evidence)
-        return records, until, every, found
+        return problem, every, found
 
     def _searched(
         self,
         every: list[Candidate],
         given: Trial,
         refitted: Trial,
-        records: Sequence[Nuisances],
-        until: Sequence[int],
         known: Trial | None,
+        problem: Problem,
     ) -> _Searched:
         """Single effects fitted, the promising ones first, and pairs of them where that leaves something."""
-        model, tell = self.model, self.tell
+        _, records, until = problem
         stands_for_the_drive = in_step(records)
 
         def told(trials: Sequence[Trial]) -> list[Trial]:
@@ -204,69 +204,68 @@ class _Study:
             return [t for t in trials if t is best or explained(t, refitted) >= GATE]
 
         tried, left_out = promising(every)
-        found = search(tried, model, given, refitted, records, until, tell)
+        found = search(tried, given, refitted, problem, self.tell)
         if settled(told([given, refitted, *found.trials]), refitted):
             more = contained([law for t in close(found.trials) for law in t.laws], left_out)
         else:  # of a missing force that is ill seen regression may put the right law last
             more = [c for c in left_out if c.starts]
         if more:
-            found = found.and_then(search(more, model, given, refitted, records, until, tell))
+            found = found.and_then(search(more, given, refitted, problem, self.tell))
             left_out = [c for c in left_out if c not in more]
-        found = search_akin(close(found.trials), every, found, model, records, until, tell)
+        found = search_akin(close(found.trials), every, found, problem, self.tell)
         if known is not None and known.effects:
-            found = search_known(known, found, model, records, until, tell)
-        refitted = refit_from(found.trials, refitted, model, records, until)
+            found = search_known(known, found, problem, self.tell)
+        refitted = refit_from(found.trials, refitted, problem)
         trials, behind = [t.beside(refitted) for t in found.trials], found.behind
         louder = noise_beyond([given, refitted, *trials], records, until)
         trials = [t.amid(louder) for t in (given, refitted, *trials)]
-        given, refitted, *trials = beside_chance(trials, model, records, until, self.key)
+        given, refitted, *trials = beside_chance(trials, self.model, records, until, self.key)
         lack, alone = LackOfFit(records, until), told([given, refitted, *trials])
-        imposed = records[0].path is not None
-        effects = _beside(alone, refitted, every, lack, imposed=imposed) if self.pairs else []
+        effects = _beside(alone, refitted, every, lack, imposed=problem.imposed) if self.pairs else []
         if effects:
-            found = search_pairs(effects, trials, known, model, refitted, records, until, tell)
+            found = search_pairs(effects, trials, known, refitted, problem, self.tell)
             trials = best_of_each([*trials, *(t.beside(refitted).amid(louder) for t in found.trials)])
-            given, refitted, *trials = beside_chance([given, refitted, *trials], model, records, until, self.key)
+            trials = [given, refitted, *trials]
+            given, refitted, *trials = beside_chance(trials, self.model, records, until, self.key)
             done = {t.effects for t in trials}
             behind = [one for one in (*behind, *found.behind) if one.effects not in done]
         return _Searched(given, refitted, trials, behind, left_out, lack)
 
 
-def _decided(
-    found: _Searched, records: list[Nuisances], until: list[int]
-) -> tuple[list[Nuisances], _Searched, Decision]:
+def _decided(found: _Searched, problem: Problem) -> tuple[Problem, _Searched, Decision]:
     """The verdict; where no cause is named, that of records of which a share of the force is forgiven to all."""
+    _, records, until = problem
     periods = sum(n.record.duration / n.period for n in records)
 
     def decision_of(found: _Searched, **how) -> Decision:
         mapped = partial(stand_in, records=records, until=until)
         return decide(found.given, found.refitted, found.trials, mapped, found.lack, periods, **how)
 
-    imposed = records[0].path is not None
-    decision = decision_of(found, imposed=imposed, untold=untold(records), in_step=in_step(records))
+    decision = decision_of(found, imposed=problem.imposed, untold=untold(records), in_step=in_step(records))
     again = None if decision.winner.effects else forgiving(found.every, records, until)
     if again is None:
-        return records, found, decision
+        return problem, found, decision
     records, (given, refitted, *trials) = again
     compared, best = {t.effects for t in trials}, min(t.rung for t in found.trials)
     dropped = [LeftBehind(t.effects, t.rung - best) for t in found.trials if t.effects not in compared]
     lack = LackOfFit(records, until)
     found = _Searched(given, refitted, trials, [*found.behind, *dropped], found.left_out, lack)
-    return records, found, decision_of(found, forgiven=True)
+    return problem._replace(records=records), found, decision_of(found, forgiven=True)
 
 
 def _believed(
     training: Sequence[tuple[Record, int]], model: Structure, reconstruction: Reconstruction
-) -> tuple[list[Nuisances], list[int], Trial, Trial]:
-    """Records as the likelihood sees them, how many samples of each are fitted, the model as given, and refitted."""
+) -> tuple[Problem, Trial, Trial]:
+    """The problem, the model as given, and refitted."""
     whole, until = [whole for whole, _ in training], [fit for _, fit in training]
-    records = prepare_all(whole, model, reconstruction)
-    given, refitted = fit_model(model, records, until)
+    problem = Problem(model, prepare_all(whole, model, reconstruction), until)
+    given, refitted = fit_model(problem)
     if _outweighed(model, refitted.structure):
         # The noise of the force acts through the mass, and all hypotheses share one noise: that of the likelier mass.
         records = prepare_all(whole, model, reconstruction, weighed=refitted.structure)
-        given, refitted = fit_model(model, records, until, near=refitted)
-    return records, until, given, refitted
+        problem = Problem(model, records, until)
+        given, refitted = fit_model(problem, near=refitted)
+    return problem, given, refitted
 
 
 def _confirmed(

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..identification import Nuisances, Placed
+from ..identification import Placed
 from ..structures import (
     AbstractSensor,
     AbstractTerm,
@@ -20,6 +20,7 @@ from ._begin import found_in
 from ._candidates import SHAPES, Candidate, Laws, natural_starts, other_delay
 from ._effect import Effect
 from ._enough import far_off
+from ._problem import Problem
 from ._score import Replaced, gains
 from ._trial import Trial
 
@@ -51,9 +52,7 @@ def pairs(
     singles: Sequence[Trial],
     known: Trial | None,
     effects: Sequence[Effect],
-    model: Structure,
-    records: Sequence[Nuisances],
-    until: Sequence[int],
+    problem: Problem,
 ) -> list[Candidate]:
     """Pairs to be tried, from what single causes explain and what they leave; what is `known` to act before others."""
     found: list[_Pair] = []
@@ -64,45 +63,43 @@ def pairs(
         if family in families or len(families) == _BASES:
             continue
         families.append(family)
-        beside = _beside(base, base.structure, 0, effects, model, records, until)
+        beside = _beside(base, base.structure, 0, effects, problem)
         if len(families) <= _WITH_UNTOLD:
             found += [pair for pair in beside if pair.promise is None]
         found += _best(beside, _BESIDE)
     untold = [pair.candidate for pair in found if pair.promise is None]
     tried = untold + [pair.candidate for pair in _best(found, _PAIRS)]
     done = {candidate.effects for candidate in tried}
-    return tried + [c for c in _together(effects, model, records[0]) if c.effects not in done]
+    return tried + [c for c in _together(effects, problem) if c.effects not in done]
 
 
-def _together(effects: Sequence[Effect], model: Structure, nuisances: Nuisances) -> list[Candidate]:
+def _together(effects: Sequence[Effect], problem: Problem) -> list[Candidate]:
     """Pairs of laws that together explain most of what the model lacks, the best of each two families."""
     laws = [effect for effect in effects if not effect.cause.is_sensor]
     in_order = [(i, j) if _in_order(laws[i], laws[j]) else (j, i) for i, j in combinations(range(len(laws)), 2)]
     allowed = [(i, j) for i, j in in_order if _are_two(laws[i], laws[j])]
     found: dict[tuple, Candidate] = {}
-    for placed in Laws(model, nuisances).together(laws, allowed):
+    for placed in Laws(problem.model, problem.first).together(laws, allowed):
         pair = tuple(laws[i] for i in placed.laws)
         families = tuple((effect.cause.family, effect.at) for effect in pair)
         first, second = placed.terms
-        found.setdefault(families, Candidate(pair, (model + first + second,)))
+        found.setdefault(families, Candidate(pair, (problem.model + first + second,)))
         if len(found) == _TOGETHER:
             break
     return list(found.values())
 
 
-def instead(
-    pair: Trial, effects: Sequence[Effect], model: Structure, records: Sequence[Nuisances], until: Sequence[int]
-) -> list[Candidate]:
+def instead(pair: Trial, effects: Sequence[Effect], problem: Problem) -> list[Candidate]:
     """Pairs that share an effect with one that was found, its neighbours."""
     found = []
     for kept, changed in ((0, 1), (1, 0)):
         rest = pair.structure.without(pair.parts[changed])
-        beside = _beside(pair, rest, kept, effects, model, records, until)
+        beside = _beside(pair, rest, kept, effects, problem)
         if pair.effects[changed].cause.is_sensor:
             found += [one.candidate for one in beside if one.promise is None]
         effect, part = pair.effects[kept], pair.parts[kept]
         for other, late in other_delay(pair.parts[changed], effects):
-            starts = (_both(model, effect, part, other, late),)
+            starts = (_both(problem.model, effect, part, other, late),)
             found.append(Candidate(_ordered(effect, other), starts, begin=found_in(pair)))
         found += [one.candidate for one in _best(beside, _INSTEAD)]
     return [c for c in found if set(c.effects) != set(pair.effects)]
@@ -127,18 +124,10 @@ def _best(found: Sequence[_Pair], most: int) -> list[_Pair]:
     return [found[i] for _, i in sorted(told)[:most]]
 
 
-def _beside(
-    base: Trial,
-    structure: Structure,
-    kept: int,
-    effects: Sequence[Effect],
-    model: Structure,
-    records: Sequence[Nuisances],
-    until: Sequence[int],
-) -> list[_Pair]:
+def _beside(base: Trial, structure: Structure, kept: int, effects: Sequence[Effect], problem: Problem) -> list[_Pair]:
     """Pairs of one effect of a trial, which `structure` has, with every other."""
-    effect, part = base.effects[kept], base.parts[kept]
-    laws, others = Laws(structure, records[0]), [part] if isinstance(part, AbstractTerm) else []
+    model, effect, part = problem.model, base.effects[kept], base.parts[kept]
+    laws, others = Laws(structure, problem.first), [part] if isinstance(part, AbstractTerm) else []
     begin = found_in(base)
     found: list[_Pair] = []
     placed: list[tuple[Effect, list[Placed]]] = []
@@ -151,11 +140,11 @@ def _beside(
             found.append(_Pair(Candidate(_ordered(effect, other), (both,), begin=begin), None))
         elif other.cause.is_sensor:
             # A gain lies on a ridge with the own values: it begins at those as given, and at their end of it.
-            starts = natural_starts(model + part, *other, records[0])
+            starts = natural_starts(model + part, *other, problem.first)
             found.append(_Pair(Candidate(_ordered(effect, other), starts), None))
         elif shapes := laws.placed(other, others):
             placed.append((other, shapes))
-    gained = _gains(base, kept, laws, [shapes for _, shapes in placed], records, until)
+    gained = _gains(base, kept, laws, [shapes for _, shapes in placed], problem)
     for (other, shapes), nats in zip(placed, gained, strict=True):
         best = sorted(zip(shapes, nats, strict=True), key=lambda one: -one[1])[:SHAPES]
         terms = [shape.term for shape, _ in best] + laws.natural(other)
@@ -166,16 +155,9 @@ def _beside(
     return found
 
 
-def _gains(
-    base: Trial,
-    kept: int,
-    laws: Laws,
-    placed: Sequence[list[Placed]],
-    records: Sequence[Nuisances],
-    until: Sequence[int],
-) -> list[list[float]]:
+def _gains(base: Trial, kept: int, laws: Laws, placed: Sequence[list[Placed]], problem: Problem) -> list[list[float]]:
     """What each shape of each law promises beside one effect of a trial, instead of the other if it has two."""
-    if records[0].path is not None or not placed:
+    if problem.imposed or not placed:
         return [[-shape.left for shape in shapes] for shapes in placed]
     replaced = None
     for part in base.parts[:kept] + base.parts[kept + 1 :]:
@@ -183,7 +165,7 @@ def _gains(
             paths = base.structure.entries().keys() - laws.structure.entries().keys()
             replaced = Replaced(laws.forces([part])[0], frozenset(paths))
     forces = np.concatenate([laws.forces([shape.term for shape in shapes]) for shapes in placed])
-    nats = base.evidence + gains(base, base.posterior(records, until), forces, replaced)
+    nats = base.evidence + gains(base, base.posterior(problem.records, problem.until), forces, replaced)
     return [part.tolist() for part in np.split(nats, np.cumsum([len(shapes) for shapes in placed])[:-1])]
 
 

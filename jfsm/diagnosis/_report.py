@@ -1,7 +1,7 @@
 """A decision put into values, words and plain data."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, NamedTuple
 
@@ -50,7 +50,7 @@ def assemble(
     tested: Tested,
     model: Structure,
     extended: Structure,
-    records: list[Nuisances],
+    records: Sequence[Nuisances],
     missing: Residual,
     gain: Gain | None,
     runs: list[dict],
@@ -327,7 +327,7 @@ def _said(finding: Finding, known: Mapping[str, Cause]) -> str:
     return f"{said} By this record it may as well be {' or '.join(dict(others))}."
 
 
-def _record(records: list[Nuisances]) -> dict[str, Any]:
+def _record(records: Sequence[Nuisances]) -> dict[str, Any]:
     first = records[0]
     record = first.record
     channels = [

@@ -1,6 +1,7 @@
 """The force that the refitted model leaves, as points, as a map, and as a term that stands in for a law."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -59,7 +60,7 @@ def residual(structure: Structure, nuisances: Nuisances, until: int, at: tuple[i
     return Residual(links[link], d, w, f, std[link], force_map)
 
 
-def stand_in(trial: Trial, records: list[Nuisances], until: list[int]) -> Trial | None:
+def stand_in(trial: Trial, records: Sequence[Nuisances], until: Sequence[int]) -> Trial | None:
     """A trial with the map of what it leaves, judged like any other hypothesis.
 
     Its values stay, and the map is fixed. Held-out samples are its guard against freedom.

@@ -8,14 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from .._threads import compiled_once, side_by_side
-from ..identification import LADDER, LANES, Maximum, Nuisances, Posterior, approach, finish, lanes_of, rungs
+from ..identification import LADDER, LANES, Maximum, Posterior, approach, finish, lanes_of, rungs
 from ..structures import Structure
 from ._adequacy import GATE, SIGNIFICANT, explained
 from ._begin import Begin, found_in, own_part
-from ._candidates import Candidate, hypothesis, late_instead, resting, special_cases
+from ._candidates import Candidate, late_instead, resting, special_cases
 from ._effect import Effect, families
 from ._enough import far_off, is_itself
 from ._pairs import crossed, instead, pairs
+from ._problem import Problem
 from ._trial import Trial, trial
 
 _FAR_BEHIND = 200.0
@@ -76,6 +77,8 @@ class Found(NamedTuple):
         return Found(trials, list(behind.values()))
 
 
+Tell = Callable[[str, int], None]
+"""Told of every step: what, and how many more steps there may be."""
 Beginning = tuple[Candidate, Structure, Begin | None]
 """A candidate, the structure with the size of its effect, and where it begins otherwise (None: as given)."""
 
@@ -83,15 +86,12 @@ Beginning = tuple[Candidate, Structure, Begin | None]
 class _Lot:
     """Starts of one law on their way up, side by side."""
 
-    def __init__(
-        self, beginnings: Sequence[Beginning], model: Structure, records: Sequence[Nuisances], until, ladder: Sequence
-    ):
+    def __init__(self, beginnings: Sequence[Beginning], problem: Problem, ladder: Sequence[float]):
         candidates, starts, begins = zip(*beginnings, strict=True)
-        records = [n.resolving(starts) for n in records]
         lanes = lanes_of(starts[0])
+        problem = problem.resolving(starts)
         posteriors = [
-            Posterior(hypothesis(model, starts[i : i + lanes], records, begins=begins[i : i + lanes]), records, until)
-            for i in range(0, len(starts), lanes)
+            problem.posterior(starts[i : i + lanes], begins[i : i + lanes]) for i in range(0, len(starts), lanes)
         ]
         self.label = " beside ".join(effect.label for effect in candidates[0].effects)
         self.families = families(candidates[0].effects)
@@ -124,16 +124,14 @@ class _Lot:
             yield trial(self.posterior, found, lane, float(self.rung.value[lane]), effects=one.effects)
 
 
-def fit_model(
-    model: Structure, records: Sequence[Nuisances], until: Sequence[int], near: Trial | None = None
-) -> tuple[Trial, Trial]:
+def fit_model(problem: Problem, near: Trial | None = None) -> tuple[Trial, Trial]:
     """The model as given, and with its own values refitted, each the better of two climbs.
 
     One comes down the ladder, for values that are far off; one begins at the values as given, for a model that lacks
     something, whose top rungs lead astray. Of values refitted before, `near` tells them.
     """
     own = None if near is None else own_part(found_in(near))
-    both = min(2, lanes_of(model))
+    both = min(2, lanes_of(problem.model))
     ladder = LADDER if near is None else LADDER[-1:]
 
     def climb(posterior: Posterior) -> tuple[Maximum, float]:
@@ -141,10 +139,7 @@ def fit_model(
         theta = np.vstack([rung.theta[:1], posterior.initial()[1:]])
         return finish(posterior, replace(rung, theta=theta)), float(rung.value[0])
 
-    posteriors = [
-        Posterior(hypothesis(model, [model] * both, records, refit=refit, begins=[own] * both), records, until)
-        for refit in (False, True)
-    ]
+    posteriors = [problem.posterior([problem.model] * both, [own] * both, refit=refit) for refit in (False, True)]
     posteriors[0].evaluate(posteriors[0].initial())  # compiled once, before both ask for it
     climbed = side_by_side(climb, posteriors)
     given, refitted = (
@@ -154,15 +149,13 @@ def fit_model(
     return given, refitted
 
 
-def refit_from(
-    beside: Sequence[Trial], refitted: Trial, model: Structure, records: Sequence[Nuisances], until: Sequence[int]
-) -> Trial:
+def refit_from(beside: Sequence[Trial], refitted: Trial, problem: Problem) -> Trial:
     """The model refitted, the better of two climbs: its own may have stopped below where one from own values leads that
     were found beside an effect."""
-    begins = [own_part(found_in(t)) for t in sorted(beside, key=lambda t: t.value)[: lanes_of(model)]]
+    begins = [own_part(found_in(t)) for t in sorted(beside, key=lambda t: t.value)[: lanes_of(problem.model)]]
     if not begins:
         return refitted
-    posterior = Posterior(hypothesis(model, [model] * len(begins), records, begins=begins), records, until)
+    posterior = problem.posterior([problem.model] * len(begins), begins)
     rung = approach(posterior, LADDER[-1:])
     found = finish(posterior, rung)
     again = trial(posterior, found, int(np.argmin(found.value)), float(np.min(rung.value)), refitted.label)
@@ -192,16 +185,14 @@ def groups(tried: Sequence[Candidate], own: Begin | None) -> list[list[Beginning
 
 def search(
     tried: Sequence[Candidate],
-    model: Structure,
     given: Trial,
     refitted: Trial,
-    records: Sequence[Nuisances],
-    until: Sequence[int],
-    tell: Callable[[str, int], None],
+    problem: Problem,
+    tell: Tell,
 ) -> Found:
     """Every candidate fitted, those far behind only so far."""
     own = own_part(found_in(refitted)) if refitted.evidence > given.evidence else None
-    lots = [_Lot(beginnings, model, records, until, _ALONE.ladder) for beginnings in groups(tried, own)]
+    lots = [_Lot(beginnings, problem, _ALONE.ladder) for beginnings in groups(tried, own)]
     most = sorted((candidate.share or 0.0 for candidate in tried), reverse=True)[:_PROMISING]
     kept = [lot for lot in lots if lot.share > 0 and lot.share >= most[-1]]
     return _climbed(lots, _ALONE, kept, refitted, tell)
@@ -211,10 +202,8 @@ def search_akin(
     close: Sequence[Trial],
     every: Sequence[Candidate],
     known: Found,
-    model: Structure,
-    records: Sequence[Nuisances],
-    until: Sequence[int],
-    tell: Callable[[str, int], None],
+    problem: Problem,
+    tell: Tell,
 ) -> Found:
     """What is akin to laws that come close, special cases and others, and late channels instead of early ones, fitted
     from their numbers too.
@@ -226,40 +215,34 @@ def search_akin(
         begin = found_in(t)
         for law in t.laws:
             tried += special_cases(law, begin, every)
-            tried += resting(t.structure, law, begin, every, model, records[0])
+            tried += resting(t.structure, law, begin, every, problem.model, problem.first)
         for part in t.parts:
-            tried += late_instead(part, begin, effects, model)
+            tried += late_instead(part, begin, effects, problem.model)
+    return _from_there(tried, known, problem, tell)
+
+
+def search_known(found: Trial, others: Found, problem: Problem, tell: Tell) -> Found:
+    """What another part of the records told, fitted from there too."""
+    start = found.effects_on(problem.model)
+    return _from_there([Candidate(found.effects, (start,), begin=own_part(found_in(found)))], others, problem, tell)
+
+
+def _from_there(tried: Sequence[Candidate], known: Found, problem: Problem, tell: Tell) -> Found:
+    """What is known already, and candidates that begin from numbers that were found."""
     if not tried:
         return known
-    lots = [_Lot(beginnings, model, records, until, _FROM_THERE.ladder) for beginnings in groups(tried, None)]
+    lots = [_Lot(beginnings, problem, _FROM_THERE.ladder) for beginnings in groups(tried, None)]
     best = min(known.trials, key=lambda t: t.value)
     return known.and_then(_climbed(lots, _FROM_THERE, [], best, tell))
-
-
-def search_known(
-    found: Trial,
-    others: Found,
-    model: Structure,
-    records: Sequence[Nuisances],
-    until: Sequence[int],
-    tell: Callable[[str, int], None],
-) -> Found:
-    """What another part of the records told, fitted from there too."""
-    tried = [Candidate(found.effects, (found.effects_on(model),), begin=own_part(found_in(found)))]
-    lots = [_Lot(beginnings, model, records, until, _FROM_THERE.ladder) for beginnings in groups(tried, None)]
-    best = min(others.trials, key=lambda t: t.value)
-    return others.and_then(_climbed(lots, _FROM_THERE, lots, best, tell))
 
 
 def search_pairs(
     effects: Sequence[Effect],
     singles: Sequence[Trial],
     known: Trial | None,
-    model: Structure,
     refitted: Trial,
-    records: Sequence[Nuisances],
-    until: Sequence[int],
-    tell: Callable[[str, int], None],
+    problem: Problem,
+    tell: Tell,
 ) -> Found:
     """Pairs of good single causes fitted, then those that share one with the best pair, as long as that changes.
 
@@ -268,29 +251,31 @@ def search_pairs(
     best = min([refitted, *singles], key=lambda t: t.value)
 
     def climbed(tried: Sequence[Candidate], way: _Way, kept: list[str] | None = None) -> Found:
-        lots = [_Lot(beginnings, model, records, until, way.ladder) for beginnings in groups(tried, None)]
+        lots = [_Lot(beginnings, problem, way.ladder) for beginnings in groups(tried, None)]
         return _climbed(lots, way, [lot for lot in lots if lot.families == kept], best, tell)
 
-    found, before = climbed(pairs(singles, known, effects, model, records, until), _TOGETHER), best
-    for _ in range(_ROUNDS):
+    def leading(found: Found) -> Trial:
         possible = [t for t in found.trials if is_itself(t) and far_off(t) <= far_off(refitted)]
-        leader = max(possible, key=lambda t: t.evidence, default=best)
+        return max(possible, key=lambda t: t.evidence, default=best)
+
+    found, before = climbed(pairs(singles, known, effects, problem), _TOGETHER), best
+    for _ in range(_ROUNDS):
+        leader = leading(found)
         gained = leader.evidence - before.evidence
         if gained < SIGNIFICANT and (before is not best or explained(leader, best) < GATE):
             break
         # From the leader's numbers some may arrive that stopped on their way from elsewhere. Those of its own families
         # are seen off at their tops only: laws alike tell apart late.
         kin, done = families(leader.effects), {t.effects for t in found.trials}
-        near = instead(leader, effects, model, records, until)
+        near = instead(leader, effects, problem)
         near = [c for c in near if c.effects not in done or families(c.effects) == kin]
         found, before = found.and_then(climbed(near, _INSTEAD, kept=kin)), leader
-    if not found.trials:
+    leader = leading(found)
+    if leader is best:
         return found
-    best_pair = max(found.trials, key=lambda t: t.evidence)
-    kin = families(best_pair.effects)
-    alike = [t for t in found.trials if families(t.effects) == kin and best_pair.evidence - t.evidence < _ALIKE]
-    tried = crossed(alike, model) + _each_alone(best_pair, model)
-    return found.and_then(climbed(tried, _FROM_THERE, kept=kin))
+    kin = families(leader.effects)
+    alike = [t for t in found.trials if families(t.effects) == kin and abs(leader.evidence - t.evidence) < _ALIKE]
+    return _from_there(crossed(alike, problem.model) + _each_alone(leader, problem.model), found, problem, tell)
 
 
 def _each_alone(pair: Trial, model: Structure) -> list[Candidate]:
@@ -299,9 +284,7 @@ def _each_alone(pair: Trial, model: Structure) -> list[Candidate]:
     return [Candidate((effect,), (model + part,), begin=found_in(pair)) for effect, part in parts]
 
 
-def _climbed(
-    lots: Sequence[_Lot], way: _Way, kept: Sequence[_Lot], best: Trial, tell: Callable[[str, int], None]
-) -> Found:
+def _climbed(lots: Sequence[_Lot], way: _Way, kept: Sequence[_Lot], best: Trial, tell: Tell) -> Found:
     """All lots on their way up, the hopeless ones that are not `kept` only so far; `best` is known already."""
     for together in compiled_once(lots):
         for lot in side_by_side(_Lot.step, together):

@@ -1,0 +1,38 @@
+"""What hypotheses are fitted to: a model, records of what it simulates, and how much of each is fitted."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ..identification import Nuisances, Posterior
+from ..structures import Structure
+from ._begin import Begin
+from ._candidates import hypothesis
+
+
+class Problem(NamedTuple):
+    """A model, records as the likelihood sees them, and how many samples of each are fitted."""
+
+    model: Structure
+    records: Sequence[Nuisances]
+    until: Sequence[int]
+
+    @property
+    def first(self) -> Nuisances:
+        """The record from whose motion a search begins."""
+        return self.records[0]
+
+    @property
+    def imposed(self) -> bool:
+        """Whether the motion is imposed."""
+        return self.first.path is not None
+
+    def resolving(self, starts: Sequence[Structure]) -> "Problem":
+        """The same, in steps that are short enough for all of these structures."""
+        return self._replace(records=[n.resolving(starts) for n in self.records])
+
+    def posterior(
+        self, starts: Sequence[Structure], begins: Sequence[Begin | None] = (), *, refit: bool = True
+    ) -> Posterior:
+        """The posterior of structures that climb side by side."""
+        posed = hypothesis(self.model, starts, self.records, refit=refit, begins=begins)
+        return Posterior(posed, self.records, self.until)
