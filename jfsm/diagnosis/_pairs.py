@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .._threads import side_by_side
 from ..identification import Placed
 from ..structures import (
     AbstractSensor,
@@ -34,8 +35,8 @@ _WITH_UNTOLD = 2
 """Bases beside which effects are tried that no missing force tells of, sensors' faults before all."""
 _TOGETHER = 4
 """Pairs that are tried because their laws together explain most, whatever either explains alone."""
-_INSTEAD = 8
-"""Laws that are tried instead of either effect of the best pair."""
+_INSTEAD = 5
+"""Laws that are tried instead of either effect of the best pair, those that promise most."""
 _ONE_SPRING = {QuadraticStiffness, CubicStiffness}
 """Laws of one family that are two effects all the same: the parts of an asymmetric spring."""
 
@@ -130,7 +131,7 @@ def _beside(base: Trial, structure: Structure, kept: int, effects: Sequence[Effe
     laws, others = Laws(structure, problem.first), [part] if isinstance(part, AbstractTerm) else []
     begin = found_in(base)
     found: list[_Pair] = []
-    placed: list[tuple[Effect, list[Placed]]] = []
+    to_place: list[Effect] = []
     for other in effects:
         if not _are_two(effect, other):
             continue
@@ -142,8 +143,10 @@ def _beside(base: Trial, structure: Structure, kept: int, effects: Sequence[Effe
             # A gain lies on a ridge with the own values: it begins at those as given, and at their end of it.
             starts = natural_starts(model + part, *other, problem.first)
             found.append(_Pair(Candidate(_ordered(effect, other), starts), None))
-        elif shapes := laws.placed(other, others):
-            placed.append((other, shapes))
+        else:
+            to_place.append(other)
+    shapes_of = list(side_by_side(lambda other: laws.placed(other, others), to_place))
+    placed = [(other, shapes) for other, shapes in zip(to_place, shapes_of, strict=True) if shapes]
     gained = _gains(base, kept, laws, [shapes for _, shapes in placed], problem)
     for (other, shapes), nats in zip(placed, gained, strict=True):
         best = sorted(zip(shapes, nats, strict=True), key=lambda one: -one[1])[:SHAPES]

@@ -10,7 +10,7 @@ import numpy as np
 from .._threads import compiled_once, side_by_side
 from ..identification import LADDER, LANES, Maximum, Posterior, approach, finish, lanes_of, rungs
 from ..structures import Structure
-from ._adequacy import GATE, SIGNIFICANT, explained
+from ._adequacy import GATE, SIGNIFICANT, adequate, explained
 from ._begin import Begin, found_in, own_part
 from ._candidates import Candidate, late_instead, resting, special_cases
 from ._effect import Effect, families
@@ -265,10 +265,11 @@ def search_pairs(
         if gained < SIGNIFICANT and (before is not best or explained(leader, best) < GATE):
             break
         # From the leader's numbers some may arrive that stopped on their way from elsewhere. Those of its own families
-        # are seen off at their tops only: laws alike tell apart late.
+        # are seen off at their tops only: laws alike tell apart late. Once it leaves noise only, others are no use.
         kin, done = families(leader.effects), {t.effects for t in found.trials}
+        others = before is best or not adequate(leader)
         near = instead(leader, effects, problem)
-        near = [c for c in near if c.effects not in done or families(c.effects) == kin]
+        near = [c for c in near if families(c.effects) == kin or (others and c.effects not in done)]
         found, before = found.and_then(climbed(near, _INSTEAD, kept=kin)), leader
     leader = leading(found)
     if leader is best:
