@@ -25,7 +25,7 @@ from jfsm.diagnosis._problem import Problem
 from jfsm.diagnosis._score import Replaced, gains
 from jfsm.diagnosis._search import Found, LeftBehind, fit_model, refit_from, search, search_akin, search_pairs
 from jfsm.identification import Posterior, prepare
-from jfsm.structures import Coulomb, SineStiffness, Stribeck, causes
+from jfsm.structures import Coulomb, SineStiffness, SmoothCoulomb, Stribeck, causes
 
 MODEL = jfsm.Structure.sdof(1.0, 9.0, 0.3)
 
@@ -205,11 +205,15 @@ def test_effects_of_pairs_alike_are_tried_together_too(with_friction):
         )
 
     found = [pair(friction, spring, 70.0), pair(stribeck, sine, 60.0), pair(stribeck, spring, 50.0)]
-    (candidate,) = crossed(found, MODEL)
+    (candidate,) = crossed(found, [], MODEL)
     assert candidate.effects == (friction, sine)
     assert candidate.starts[0].terms[-2:] == (parts[friction], parts[sine])
     (unknowns,) = hypothesis(MODEL, candidate.starts, records, begins=[candidate.begin]).unknowns
     assert next(u.theta for u in unknowns if u.path == "stiffness@0-1.k") == pytest.approx(0.07)
+    smooth = Effect(known["smooth_coulomb"], (0, 1))
+    alone: Any = SimpleNamespace(effects=(smooth,), parts=(SmoothCoulomb(0.8, 0.1, at=(0, 1)),), evidence=40.0)
+    tried = {candidate.effects for candidate in crossed(found, [alone], MODEL)}
+    assert tried == {(friction, sine), (smooth, spring), (smooth, sine)}
 
 
 def test_what_is_tried_beside_an_effect_begins_where_that_left_all_other_numbers(with_friction):

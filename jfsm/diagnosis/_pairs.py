@@ -106,17 +106,27 @@ def instead(pair: Trial, effects: Sequence[Effect], problem: Problem) -> list[Ca
     return [c for c in found if set(c.effects) != set(pair.effects)]
 
 
-def crossed(found: Sequence[Trial], model: Structure) -> list[Candidate]:
-    """Pairs of an effect of one of these and one of another, all of the same families, that are not among them."""
-    done, tried = {t.effects for t in found}, dict[tuple, Candidate]()
-    for first, second in product(found, found):
-        one, other = first.effects[0], second.effects[1]
+def crossed(found: Sequence[Trial], singles: Sequence[Trial], model: Structure) -> list[Candidate]:
+    """Pairs of an effect of one of these and one of another, all of the same families, that are not among them.
+
+    Effects of `singles` take part where they are of these families. All begin where the best pair ended.
+    """
+    best = max(found, key=lambda t: t.evidence)
+    places = [dict[Effect, AbstractTerm | AbstractSensor](), dict[Effect, AbstractTerm | AbstractSensor]()]
+    for t in sorted(found, key=lambda t: -t.evidence):
+        for place, effect, part in zip(places, t.effects, t.parts, strict=True):
+            place.setdefault(effect, part)
+    for t in singles:
+        [effect], [part] = t.effects, t.parts
+        for place, mine in zip(places, best.effects, strict=True):
+            if (effect.cause.family, effect.at) == (mine.cause.family, mine.at):
+                place.setdefault(effect, part)
+    done, tried = {t.effects for t in found}, list[Candidate]()
+    for (one, part), (other, law) in product(places[0].items(), places[1].items()):
         effects = _ordered(one, other)
-        if effects not in done and effects not in tried and _are_two(one, other):
-            start = _both(model, one, first.parts[0], other, second.parts[1])
-            better = max(first, second, key=lambda t: t.evidence)
-            tried[effects] = Candidate(effects, (start,), begin=found_in(better))
-    return list(tried.values())
+        if effects not in done and _are_two(one, other):
+            tried.append(Candidate(effects, (_both(model, one, part, other, law),), begin=found_in(best)))
+    return tried
 
 
 def _best(found: Sequence[_Pair], most: int) -> list[_Pair]:

@@ -276,7 +276,9 @@ def search_pairs(
         return found
     kin = families(leader.effects)
     alike = [t for t in found.trials if families(t.effects) == kin and abs(leader.evidence - t.evidence) < _ALIKE]
-    return _from_there(crossed(alike, problem.model) + _each_alone(leader, problem.model), found, problem, tell)
+    alone = [t for t in singles if t.effects and best.evidence - t.evidence < _ALIKE]
+    tried = crossed(alike, alone, problem.model) + _each_alone(leader, problem.model)
+    return _from_there(tried, found, problem, tell)
 
 
 def _each_alone(pair: Trial, model: Structure) -> list[Candidate]:

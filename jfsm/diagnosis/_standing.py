@@ -95,8 +95,11 @@ def _shows_as_a_bias(t: Trial, alone: Trial) -> bool:
 
 
 def _adds(t: Trial, alone: Trial) -> type | None:
-    """What a pair has beside one of its effects alone."""
-    beside = [effect.cause.effect for effect in t.effects if effect not in alone.effects]
+    """What a pair has beside one effect alone, which is one of its own or stands for one of the same family."""
+    (single,) = alone.effects
+    kin = [e for e in t.effects if (e.cause.family, e.at) == (single.cause.family, single.at)]
+    shared = single if single in t.effects else next(iter(kin), None)
+    beside = [effect.cause.effect for effect in t.effects if effect != shared]
     return beside[0] if len(beside) == 1 else None
 
 
