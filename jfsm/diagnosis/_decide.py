@@ -17,6 +17,7 @@ import numpy as np
 from ..structures import AbstractTerm
 from ._adequacy import GATE, MUCH, NEARLY_ALL, NEGLIGIBLE, SIGNIFICANT, adequate, almost_all, explained, white
 from ._doubt import UNFIT, doubt
+from ._effect import families
 from ._lack_of_fit import Unfit
 from ._standing import special_case, why_not
 from ._trial import Trial
@@ -123,11 +124,6 @@ def decide(
     return Decision(verdict, winner, ranked.chance, ranked.kappa, ranked.why)
 
 
-def families(t: Trial) -> list[str]:
-    """Families of a trial's causes."""
-    return sorted(effect.cause.family for effect in t.effects)
-
-
 class _Ranked:
     """Candidates, why each is not named, how much it explains, and how probable those are that may be."""
 
@@ -205,7 +201,7 @@ class _Ranked:
         self.why[id(t)], self.chance[id(t)] = why, 0.0
 
     def _family(self, winner: Trial) -> list[Trial]:
-        return [t for t in self.passing if families(t) == families(winner)]
+        return [t for t in self.passing if families(t.effects) == families(winner.effects)]
 
 
 def probabilities(trials: Sequence[Trial], periods: float) -> np.ndarray:

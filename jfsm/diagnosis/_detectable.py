@@ -28,8 +28,9 @@ from .._threads import compiled_once, side_by_side
 from ..identification import Nuisances, Posterior, prior
 from ..structures import Preload, Structure
 from ._adequacy import NOTICEABLE, SIGNIFICANT
-from ._candidates import Candidate, hypothesis, modest
+from ._candidates import Candidate, modest
 from ._effect import Effect
+from ._problem import Problem
 from ._standing import UNPREDICTED
 from ._trial import SLACKS, Trial, ended, extent, sets, windows
 
@@ -97,8 +98,7 @@ def naturally_detectable(candidates: Sequence[Candidate], silence: Silence) -> l
     every = []
     for candidate in candidates:
         start = modest(candidate, silence.model, silence.records[0])
-        records = [n.resolving([start]) for n in silence.records]
-        posterior = Posterior(hypothesis(silence.model, [start], records), records, silence.until)
+        posterior = Problem(silence.model, silence.records, silence.until).resolving([start]).posterior([start])
         every.append(_Seen(candidate.effects, posterior, silence))
     found = [one for together in compiled_once(every) for one in side_by_side(_Seen.natural, together)]
     return [one for one in found if one is not None]

@@ -262,8 +262,7 @@ def _believed(
     given, refitted = fit_model(problem)
     if _outweighed(model, refitted.structure):
         # The noise of the force acts through the mass, and all hypotheses share one noise: that of the likelier mass.
-        records = prepare_all(whole, model, reconstruction, weighed=refitted.structure)
-        problem = Problem(model, records, until)
+        problem = problem._replace(records=prepare_all(whole, model, reconstruction, weighed=refitted.structure))
         given, refitted = fit_model(problem, near=refitted)
     return problem, given, refitted
 

@@ -15,7 +15,6 @@ WORTH_A_SECOND = 0.03
 """Share of the refit's error by which two effects must predict better than either of them alone."""
 MAY_HIDE = (ForceGain, AccelerationGain, Preload, AccelerationBias)
 """Effects that own values and offsets may stand for."""
-
 _NEAR = 0.01
 """Distance to the farthest own value, as a share of it, from which a value is there."""
 

@@ -18,14 +18,14 @@ import numpy as np
 from .._result import Result
 from .._threads import side_by_side
 from ..dynamics import simulate
-from ..identification import LADDER, Nuisances, Posterior, approach, finish, lanes_of, prepare
+from ..identification import LADDER, Nuisances, approach, finish, lanes_of, prepare
 from ..records import Record
 from ..structures import AbstractTerm, Structure
 from ._adequacy import SIGNIFICANT
 from ._begin import found_in, own_part
-from ._candidates import hypothesis
 from ._chance import noise_levels
 from ._gain import remeasured
+from ._problem import Problem
 from ._trial import Trial
 
 RIVAL = 0.02
@@ -192,11 +192,8 @@ def _evidence(model: Structure, nuisances: Nuisances, rival: Trial) -> float:
     """Log-evidence of a rival on another record, from where the one at hand left its numbers."""
     start = rival.effects_on(model)
     lanes = lanes_of(start)
-    records = [nuisances.resolving([start])]
-    own = own_part(found_in(rival))
-    posterior = Posterior(
-        hypothesis(model, [start] * lanes, records, begins=[own] * lanes), records, [nuisances.samples]
-    )
+    problem = Problem(model, [nuisances], [nuisances.samples]).resolving([start])
+    posterior = problem.posterior([start] * lanes, [own_part(found_in(rival))] * lanes)
     return finish(posterior, approach(posterior, LADDER[-1:])).evidence(0)
 
 

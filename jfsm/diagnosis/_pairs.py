@@ -64,7 +64,7 @@ def pairs(
         if family in families or len(families) == _BASES:
             continue
         families.append(family)
-        beside = _beside(base, base.structure, 0, effects, problem)
+        beside = _beside(base, 0, effects, problem)
         if len(families) <= _WITH_UNTOLD:
             found += [pair for pair in beside if pair.promise is None]
         found += _best(beside, _BESIDE)
@@ -94,8 +94,7 @@ def instead(pair: Trial, effects: Sequence[Effect], problem: Problem) -> list[Ca
     """Pairs that share an effect with one that was found, its neighbours."""
     found = []
     for kept, changed in ((0, 1), (1, 0)):
-        rest = pair.structure.without(pair.parts[changed])
-        beside = _beside(pair, rest, kept, effects, problem)
+        beside = _beside(pair, kept, effects, problem)
         if pair.effects[changed].cause.is_sensor:
             found += [one.candidate for one in beside if one.promise is None]
         effect, part = pair.effects[kept], pair.parts[kept]
@@ -135,9 +134,11 @@ def _best(found: Sequence[_Pair], most: int) -> list[_Pair]:
     return [found[i] for _, i in sorted(told)[:most]]
 
 
-def _beside(base: Trial, structure: Structure, kept: int, effects: Sequence[Effect], problem: Problem) -> list[_Pair]:
-    """Pairs of one effect of a trial, which `structure` has, with every other."""
+def _beside(base: Trial, kept: int, effects: Sequence[Effect], problem: Problem) -> list[_Pair]:
+    """Pairs of one effect of a trial with every other, instead of the trial's second if it has two."""
     model, effect, part = problem.model, base.effects[kept], base.parts[kept]
+    changed = base.parts[1 - kept] if len(base.parts) > 1 else None
+    structure = base.structure if changed is None else base.structure.without(changed)
     laws, others = Laws(structure, problem.first), [part] if isinstance(part, AbstractTerm) else []
     begin = found_in(base)
     found: list[_Pair] = []
@@ -157,7 +158,7 @@ def _beside(base: Trial, structure: Structure, kept: int, effects: Sequence[Effe
             to_place.append(other)
     shapes_of = list(side_by_side(lambda other: laws.placed(other, others), to_place))
     placed = [(other, shapes) for other, shapes in zip(to_place, shapes_of, strict=True) if shapes]
-    gained = _gains(base, kept, laws, [shapes for _, shapes in placed], problem)
+    gained = _gains(base, changed, laws, [shapes for _, shapes in placed], problem)
     for (other, shapes), nats in zip(placed, gained, strict=True):
         best = sorted(zip(shapes, nats, strict=True), key=lambda one: -one[1])[:SHAPES]
         terms = [shape.term for shape, _ in best] + laws.natural(other)
@@ -168,15 +169,20 @@ def _beside(base: Trial, structure: Structure, kept: int, effects: Sequence[Effe
     return found
 
 
-def _gains(base: Trial, kept: int, laws: Laws, placed: Sequence[list[Placed]], problem: Problem) -> list[list[float]]:
-    """What each shape of each law promises beside one effect of a trial, instead of the other if it has two."""
+def _gains(
+    base: Trial,
+    changed: AbstractTerm | AbstractSensor | None,
+    laws: Laws,
+    placed: Sequence[list[Placed]],
+    problem: Problem,
+) -> list[list[float]]:
+    """What each shape of each law promises beside a trial, instead of its part that is `changed` if that is a law."""
     if problem.imposed or not placed:
         return [[-shape.left for shape in shapes] for shapes in placed]
     replaced = None
-    for part in base.parts[:kept] + base.parts[kept + 1 :]:
-        if isinstance(part, AbstractTerm):
-            paths = base.structure.entries().keys() - laws.structure.entries().keys()
-            replaced = Replaced(laws.forces([part])[0], frozenset(paths))
+    if isinstance(changed, AbstractTerm):
+        paths = base.structure.entries().keys() - laws.structure.entries().keys()
+        replaced = Replaced(laws.forces([changed])[0], frozenset(paths))
     forces = np.concatenate([laws.forces([shape.term for shape in shapes]) for shapes in placed])
     nats = base.evidence + gains(base, base.posterior(problem.records, problem.until), forces, replaced)
     return [part.tolist() for part in np.split(nats, np.cumsum([len(shapes) for shapes in placed])[:-1])]
