@@ -170,6 +170,26 @@ def test_the_force_that_is_missing_would_gain_most_beside_a_refit(with_friction,
     assert spring < 0.1 * friction
 
 
+def test_a_number_with_which_the_motion_runs_away_says_nothing_of_what_a_force_would_gain(with_friction, fitted):
+    _, records, until = with_friction
+    _, refitted = fitted
+    force = Laws(refitted.structure, records[0]).forces([jfsm.Coulomb(0.3, at=(0, 1))])
+    posterior = refitted.posterior(records, until)
+    (known,) = gains(refitted, posterior, force)
+    untold = np.where(np.arange(refitted.theta.size) == 0, 1e12, 1.0)  # the nudge of it is as large
+    (found,) = gains(replace(refitted, covariance=refitted.covariance * untold), posterior, force)
+    assert known > 100.0 and 0.8 < found / known < 1.25
+
+
+def test_a_trial_is_looked_at_in_steps_no_longer_than_those_it_was_fitted_in(with_friction, fitted):
+    _, records, until = with_friction
+    _, refitted = fitted
+    assert refitted.steps == (records[0].fine.substeps,)
+    finer = replace(refitted, steps=(4 * records[0].fine.substeps,))
+    assert finer.posterior(records, until).records[0].fine.substeps == finer.steps[0]
+    assert replace(refitted, steps=(1,)).posterior(records, until).records[0] is records[0]
+
+
 def test_what_would_replace_an_effect_gains_what_that_gained_if_it_is_alike_and_loses_it_if_not(with_friction, fitted):
     given, refitted = fitted
     _, records, until = with_friction

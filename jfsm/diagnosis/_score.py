@@ -47,7 +47,8 @@ def moved(trial: Trial, posterior: Posterior, index: int, forces: np.ndarray) ->
     counted[0], counted[posterior.until[index] :] = False, False  # the start is an unknown
 
     def ours(readings: np.ndarray) -> np.ndarray:
-        return readings[counted] / deviation[counted]
+        inside = readings[counted] / deviation[counted]
+        return inside if np.all(np.isfinite(inside)) else np.zeros_like(inside)  # a motion that runs away tells nothing
 
     def change_of(then: Array, change: float) -> np.ndarray:
         return ours(np.asarray(then) - error) / change

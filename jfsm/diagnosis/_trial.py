@@ -67,7 +67,10 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Trial:
-    """A hypothesis at its best values: the model with these effects; `label` says what it is where there are none."""
+    """A hypothesis at its best values: the model with these effects; `label` says what it is where there are none.
+
+    Each record was fitted in so many `steps` per sample.
+    """
 
     label: str
     effects: tuple[Effect, ...]
@@ -84,6 +87,7 @@ class Trial:
     whiteness: float
     noise: np.ndarray
     trusted: np.ndarray
+    steps: tuple[int, ...]
 
     @property
     def name(self) -> str:
@@ -119,8 +123,8 @@ class Trial:
         return model
 
     def posterior(self, records: Sequence[Nuisances], until: Sequence[int]) -> Posterior:
-        """The posterior of its structure, on records in steps that are short enough for it."""
-        records = [n.resolving([self.structure]) for n in records]
+        """The posterior of its structure, on records in steps that are short enough for it, none longer than fitted."""
+        records = [n.resolving([self.structure], least) for n, least in zip(records, self.steps, strict=True)]
         return Posterior(Hypothesis((self.structure,), (self.unknowns,)), records, until)
 
     def extended(self) -> Structure:
@@ -269,4 +273,5 @@ def trial(
         whiteness=whiteness(alone, theta),
         noise=scales,
         trusted=np.concatenate([n.trusted for n in posterior.records]),
+        steps=tuple(n.fine.substeps for n in posterior.records),
     )

@@ -152,12 +152,12 @@ class Nuisances:
         added = np.stack(between, 1).reshape(samples, halves, dof)
         return Fine(fine.force + jnp.asarray(added), fine.base, fine.time, fine.step)
 
-    def resolving(self, structures: Sequence[Structure]) -> "Nuisances":
-        """The same record with steps short enough for all of these structures."""
+    def resolving(self, structures: Sequence[Structure], least: int = 1) -> "Nuisances":
+        """The same record with steps short enough for all of these structures, so many per sample at `least`."""
         record, fine = self.record, self.fine
         size = typical_size(record)
         steps_for = substeps_for if self.path is None else imposed_substeps
-        need = max(steps_for(structure, record.dt, size) for structure in structures)
+        need = max(least, *(steps_for(structure, record.dt, size) for structure in structures))
         if need <= fine.substeps:
             return self
         if self.path is not None:
