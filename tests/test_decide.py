@@ -93,6 +93,25 @@ def test_no_cause_is_named_beside_which_other_shapes_would_explain_much(nats: fl
         assert decision.winner is REFITTED and decision.share(found) == 0 and "shape" in decision.why[id(found)]
 
 
+@pytest.mark.parametrize(
+    ("seen", "causes", "verdict"),
+    [
+        (0.0, ("position_damping", "lugre"), "undecided"),
+        (0.0, ("position_damping",), "cause"),
+        (0.0, ("position_damping", "accel_gain"), "cause"),
+        (0.0, ("position_damping", "preload"), "cause"),
+        (0.1, ("position_damping", "lugre"), "cause"),
+    ],
+)
+def test_two_laws_of_which_predictions_show_nothing_are_not_named(seen: float, causes: tuple[str, ...], verdict: str):
+    refitted, alone = trial(1000.0, seen), trial(1060.0, seen, "coulomb")
+    found = trial(1100.0, 0.0, *causes)
+    refitted.whiteness = 0.4
+    decision = decide(GIVEN, refitted, [alone, found], lambda t: None, lambda t: Unfit(0.0), periods=100.0)
+    assert decision.verdict == verdict
+    assert ("predictions show nothing" in decision.why[id(found)]) == (verdict == "undecided")
+
+
 @pytest.mark.parametrize(("share", "verdict"), [(0.4, "cause"), (0.6, "undecided")])
 def test_no_cause_is_named_beside_which_other_shapes_explain_most_of_what_it_leaves(share: float, verdict: str):
     found = trial(9000.0, 0.002, "coulomb")

@@ -5,7 +5,8 @@ model leaves, and do so on every set of samples, held-out ones included. Where t
 evidence is trusted as it stands; where it does not, evidence counts no more than some tens of independent looks, and
 no cause is more probable than the share of the power that it explains. And no cause is named beside which laws of other
 shapes would gain more than a small share of what it gains itself, or explain half of what it leaves; up to there it is
-the less sure, by half at most. Nor is a record called consistent where they explain more than noise.
+the less sure, by half at most. Nor is a record called consistent where they explain more than noise. And two laws of
+which predictions show nothing are not named: together they can be what one is that is not in the catalogue.
 """
 
 import math
@@ -14,8 +15,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..structures import AbstractTerm
-from ._adequacy import GATE, MUCH, NEARLY_ALL, NEGLIGIBLE, SIGNIFICANT, adequate, almost_all, explained, white
+from ..structures import AbstractTerm, Preload
+from ._adequacy import (
+    GATE,
+    MUCH,
+    NEARLY_ALL,
+    NEGLIGIBLE,
+    SIGNIFICANT,
+    adequate,
+    almost_all,
+    explained,
+    unexplained,
+    white,
+)
 from ._doubt import UNFIT, doubt
 from ._effect import families
 from ._lack_of_fit import Unfit
@@ -24,6 +36,7 @@ from ._trial import Trial
 
 _NOT_RIGHT = "explains much of it, but is not of the right shape"
 _IN_STEP = "takes the place of a noisy drive, with which it is in step"
+_UNSEEN = "are two laws of which predictions show nothing, and may stand for one of another shape"
 _ALIKE = 0.3
 """Probability of another law of its family, in those of a law that is not of the right shape, that may take its place.
 """
@@ -98,7 +111,7 @@ def decide(
             return doubt(t, ranked.gained(t, winner), unfit._replace(share=0.0) if forgiven else unfit)
 
         winner, against = ranked.of_right_shape(winner, doubt_of)
-        if against := untold(winner) or against:
+        if against := untold(winner) or _unseen(winner, refitted) or against:
             ranked.refuse(winner, against)
             mapped = stand_in(refitted)
             stands_in = mapped is not None and explained(mapped, refitted) >= GATE
@@ -202,6 +215,12 @@ class _Ranked:
 
     def _family(self, winner: Trial) -> list[Trial]:
         return [t for t in self.passing if families(t.effects) == families(winner.effects)]
+
+
+def _unseen(t: Trial, refitted: Trial) -> str:
+    """Why two laws that only their evidence speaks for are no finding, or nothing; a constant force is no such law."""
+    laws = [e for e in t.effects if not e.cause.is_sensor and e.cause.effect is not Preload]
+    return _UNSEEN if len(laws) > 1 and not np.any(unexplained(refitted)) else ""
 
 
 def probabilities(trials: Sequence[Trial], periods: float) -> np.ndarray:
