@@ -28,11 +28,11 @@ def record() -> jfsm.Record:
 def judged(record: jfsm.Record, stiffness: float) -> tuple[Trial, Trial]:
     """A model that rubs, as the record does, before and after what noise leaves of it is drawn."""
     model = jfsm.Structure.sdof(MASS, stiffness, DAMPING) + Coulomb(FRICTION, at=(0, 1))
-    records = prepare_all([record], model)
-    given, _ = fit_model(Problem(model, records, UNTIL))
+    problem = Problem(model, prepare_all([record], model), UNTIL)
+    given, _ = fit_model(problem)
     # A model whose values are off is told by its innovations too; here what it leaves has to tell alone.
     given = replace(given, whiteness=0.0, noise=np.where(given.trusted, 0.0, given.noise))
-    (drawn,) = beside_chance([given], model, records, UNTIL, jax.random.key(1))
+    (drawn,) = beside_chance([given], problem, jax.random.key(1))
     return given, drawn
 
 
@@ -61,10 +61,10 @@ def test_white_innovations_tell_the_noise_of_a_channel_that_gave_but_a_guess(rec
     best = replace(
         given, theta=theta, evidence=refitted.evidence + 1, whiteness=0.0, trusted=guessed, noise=np.zeros(3)
     )
-    untrusting = [replace(records[0], trusted=guessed)]
+    untrusting = Problem(model, [replace(records[0], trusted=guessed)], UNTIL)
     more = 8 * float(records[0].floor[1] / records[0].spread[1]) ** 2
-    np.testing.assert_allclose(noise_beyond([best, refitted], untrusting, UNTIL), more, rtol=1e-6)
+    np.testing.assert_allclose(noise_beyond([best, refitted], untrusting), more, rtol=1e-6)
     np.testing.assert_allclose(
         refitted.amid(np.full(2, more)).prediction.expected - refitted.prediction.expected, more, rtol=1e-6
     )
-    assert not np.any(noise_beyond([replace(best, whiteness=0.2), refitted], untrusting, UNTIL))
+    assert not np.any(noise_beyond([replace(best, whiteness=0.2), refitted], untrusting))

@@ -40,9 +40,9 @@ def told(law: Callable[[float, float], float], channel: str, seed: int) -> float
     record = jfsm.Record(time, **noisy, at_rest=True)
     spring = CubicStiffness(CUBIC, at=(0, 1))
     model = (jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING) + spring).uncertain(cubic_stiffness=0.5)
-    records = prepare_all([record], model)
-    _, refitted = fit_model(Problem(model, records, [UNTIL]))
-    return LackOfFit(records, [UNTIL])(refitted).nats
+    problem = Problem(model, prepare_all([record], model), [UNTIL])
+    _, refitted = fit_model(problem)
+    return LackOfFit(problem)(refitted).nats
 
 
 @pytest.mark.parametrize(("channel", "seed"), [("displacement", 1), ("acceleration", 2)])

@@ -24,7 +24,7 @@ from jfsm.diagnosis._pairs import crossed, instead, pairs
 from jfsm.diagnosis._problem import Problem
 from jfsm.diagnosis._score import Replaced, gains
 from jfsm.diagnosis._search import Found, LeftBehind, fit_model, refit_from, search, search_akin, search_pairs
-from jfsm.identification import Posterior, prepare
+from jfsm.identification import prepare
 from jfsm.structures import Coulomb, SineStiffness, SmoothCoulomb, Stribeck, causes
 
 MODEL = jfsm.Structure.sdof(1.0, 9.0, 0.3)
@@ -114,7 +114,7 @@ def test_a_refit_that_stopped_on_its_way_is_climbed_again_from_own_values_found_
 
 
 def found_beside_friction(records: Any, *parts: Any, cause: str) -> Any:
-    """A trial of Coulomb friction beside an effect, whose parts its structure has with the offset of a force.
+    """A trial of Coulomb friction beside an effect, whose parts its structure has with offsets, one of a force.
 
     All its numbers ended off where they are believed to be.
     """
@@ -125,7 +125,7 @@ def found_beside_friction(records: Any, *parts: Any, cause: str) -> Any:
     effects = (Effect(known["coulomb"], (0, 1)), *(Effect(known[cause], part.at) for part in parts))
     posed = hypothesis(MODEL, [structure], records)
     (unknowns,) = posed.unknowns
-    theta, found = np.full(len(unknowns), 0.07), structure + jfsm.Offset(0.3, at=("force", 1))
+    theta, found = np.full(len(unknowns), 0.07), posed.structures[0].with_values({"offset@force-1.b": 0.3})
     return SimpleNamespace(
         effects=effects,
         parts=(friction, *parts),
@@ -134,7 +134,7 @@ def found_beside_friction(records: Any, *parts: Any, cause: str) -> Any:
         theta=theta,
         evidence=0.0,
         covariance=1e-6 * np.eye(theta.size),
-        posterior=lambda records, until: Posterior(posed, records, until),
+        steps=tuple(n.fine.substeps for n in records),
     )
 
 
@@ -160,7 +160,7 @@ def test_the_force_that_is_missing_would_gain_most_beside_a_refit(with_friction,
     tried = [jfsm.Coulomb(0.3, at=(0, 1)), jfsm.CubicStiffness(0.1, at=(0, 1))]
     forces = np.concatenate([laws.forces([law]) for law in tried])
     forces = np.concatenate([forces, -forces[:1], np.full_like(forces[:1], np.nan), np.zeros_like(forces[:1])])
-    friction, spring, backwards, runaway, none = gains(refitted, refitted.posterior(records, until), forces)
+    friction, spring, backwards, runaway, none = gains(refitted, with_friction, forces)
     best = max(
         search(candidates(MODEL, records, chosen_causes(["coulomb"])), given, refitted, with_friction, tell).trials,
         key=lambda t: t.evidence,
@@ -174,10 +174,9 @@ def test_a_number_with_which_the_motion_runs_away_says_nothing_of_what_a_force_w
     _, records, until = with_friction
     _, refitted = fitted
     force = Laws(refitted.structure, records[0]).forces([jfsm.Coulomb(0.3, at=(0, 1))])
-    posterior = refitted.posterior(records, until)
-    (known,) = gains(refitted, posterior, force)
+    (known,) = gains(refitted, with_friction, force)
     untold = np.where(np.arange(refitted.theta.size) == 0, 1e12, 1.0)  # the nudge of it is as large
-    (found,) = gains(replace(refitted, covariance=refitted.covariance * untold), posterior, force)
+    (found,) = gains(replace(refitted, covariance=refitted.covariance * untold), with_friction, force)
     assert known > 100.0 and 0.8 < found / known < 1.25
 
 
@@ -186,8 +185,8 @@ def test_a_trial_is_looked_at_in_steps_no_longer_than_those_it_was_fitted_in(wit
     _, refitted = fitted
     assert refitted.steps == (records[0].fine.substeps,)
     finer = replace(refitted, steps=(4 * records[0].fine.substeps,))
-    assert finer.posterior(records, until).records[0].fine.substeps == finer.steps[0]
-    assert replace(refitted, steps=(1,)).posterior(records, until).records[0] is records[0]
+    assert with_friction.posterior_of(finer).records[0].fine.substeps == finer.steps[0]
+    assert with_friction.posterior_of(replace(refitted, steps=(1,))).records[0] is records[0]
 
 
 def test_what_would_replace_an_effect_gains_what_that_gained_if_it_is_alike_and_loses_it_if_not(with_friction, fitted):
@@ -200,7 +199,7 @@ def test_what_would_replace_an_effect_gains_what_that_gained_if_it_is_alike_and_
     tried = [jfsm.Coulomb(0.3, at=(0, 1)), jfsm.CubicStiffness(0.1, at=(0, 1))]
     forces = np.concatenate([laws.forces([law]) for law in tried])
     replaced = Replaced(force, frozenset({"coulomb@0-1.F"}))
-    same, spring = gains(best, best.posterior(records, until), forces, replaced)
+    same, spring = gains(best, with_friction, forces, replaced)
     lost = refitted.evidence - best.evidence
     assert lost < -100.0
     assert abs(same) < 0.05 * abs(lost) and spring < 0.5 * lost

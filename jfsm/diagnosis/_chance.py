@@ -15,23 +15,23 @@ from .._threads import side_by_side
 from ..dynamics._grid import Fine
 from ..identification import Nuisances, prepare_all
 from ..records import Record
-from ..structures import Clipping, Structure
+from ..structures import Clipping
 from ._adequacy import adequate, white
 from ._gain import remeasured
+from ._problem import Problem
 from ._trial import Prediction, Trial, ended, extent, free_run, predict, sets
 
 _DRAWS = 6
 
 
-def beside_chance(
-    trials: Sequence[Trial], model: Structure, records: Sequence[Nuisances], until: Sequence[int], key: jax.Array
-) -> list[Trial]:
+def beside_chance(trials: Sequence[Trial], problem: Problem, key: jax.Array) -> list[Trial]:
     """The trials; the most probable, if its innovations are white and yet it leaves something, with draws of noise."""
+    model, records, _ = problem
     best = max(trials, key=lambda t: t.evidence)
     limits = any(isinstance(sensor, Clipping) for sensor in model.sensors)
-    if adequate(best) or not white(best) or limits or records[0].path is not None:
+    if adequate(best) or not white(best) or limits or problem.imposed:
         return list(trials)
-    posterior = best.posterior(records, until)
+    posterior = problem.posterior_of(best)
     runs = [free_run(posterior, best.theta, index) for index in range(len(records))]
     if not all(np.all(np.isfinite(run)) for run in runs):
         return list(trials)
@@ -40,8 +40,10 @@ def beside_chance(
 
     def draw(rng: np.random.Generator) -> np.ndarray:
         noisy = [_noisy(*parts, rng) for parts in zip(records, runs, levels, strict=True)]
-        again = prepare_all(noisy, model, records[0].reconstruction, weighed=best.structure)
-        return predict(best.posterior(again, until), best.theta, slight=not best.effects).error
+        again = problem._replace(
+            records=prepare_all(noisy, model, problem.first.reconstruction, weighed=best.structure)
+        )
+        return predict(again.posterior_of(best), best.theta, slight=not best.effects).error
 
     errors = np.array(list(side_by_side(draw, np.random.default_rng(seeds).spawn(_DRAWS))))
     found = best.prediction
@@ -53,19 +55,19 @@ def beside_chance(
     return [replace(t, prediction=prediction) if t is best else t for t in trials]
 
 
-def noise_beyond(trials: Sequence[Trial], records: Sequence[Nuisances], until: Sequence[int]) -> np.ndarray:
+def noise_beyond(trials: Sequence[Trial], problem: Problem) -> np.ndarray:
     """Power of noise per set, in units as of predictions, beyond that which channels gave but a guess of.
 
     The innovations of the most probable trial tell it where they are white.
     """
     best, more = max(trials, key=lambda t: t.evidence), []
-    for index, nuisances in enumerate(records):
+    for index, nuisances in enumerate(problem.records):
         levels = noise_levels(best, nuisances, index)
         found = np.array([levels[channel] for channel in nuisances.channels])
         guessed = ~nuisances.trusted if white(best) else np.zeros(len(found), dtype=bool)
         beyond = np.where(guessed, np.maximum(found**2 - nuisances.floor**2, 0.0), 0.0)
         power = float(np.sum(beyond / extent(nuisances) ** 2))
-        more += [power] * len(sets(nuisances, until[index]))
+        more += [power] * len(sets(nuisances, problem.until[index]))
     return np.array(more)
 
 

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .._threads import compiled_once, side_by_side
-from ..identification import Nuisances, Posterior, prior
+from ..identification import Posterior, prior
 from ..structures import Preload, Structure
 from ._adequacy import NOTICEABLE, SIGNIFICANT
 from ._candidates import Candidate, modest
@@ -67,9 +67,7 @@ class Silence(NamedTuple):
 
     given: Trial
     refitted: Trial
-    model: Structure
-    records: Sequence[Nuisances]
-    until: Sequence[int]
+    problem: Problem
 
     @property
     def spared(self) -> float:
@@ -86,7 +84,7 @@ def detectable(trials: Sequence[Trial], silence: Silence) -> list[Smallest]:
     """Smallest sizes of single effects that were fitted, in the shapes that the fits gave them."""
 
     def smallest(t: Trial) -> Smallest | None:
-        seen = _Seen(t.effects, t.posterior(silence.records, silence.until), silence)
+        seen = _Seen(t.effects, silence.problem.posterior_of(t), silence)
         return seen.smallest(t.theta, seen.factor(t.theta, t.information))
 
     found = side_by_side(smallest, [t for t in trials if len(t.effects) == 1])
@@ -95,10 +93,10 @@ def detectable(trials: Sequence[Trial], silence: Silence) -> list[Smallest]:
 
 def naturally_detectable(candidates: Sequence[Candidate], silence: Silence) -> list[Smallest]:
     """The same of any candidates, each in a natural shape: nothing speaks for that with which a fit of noise ends."""
-    every = []
+    problem, every = silence.problem, []
     for candidate in candidates:
-        start = modest(candidate, silence.model, silence.records[0])
-        posterior = Problem(silence.model, silence.records, silence.until).resolving([start]).posterior([start])
+        start = modest(candidate, problem.model, problem.first)
+        posterior = problem.resolving([start]).posterior([start])
         every.append(_Seen(candidate.effects, posterior, silence))
     found = [one for together in compiled_once(every) for one in side_by_side(_Seen.natural, together)]
     return [one for one in found if one is not None]
@@ -110,7 +108,7 @@ class _Seen:
     def __init__(self, effects: tuple[Effect, ...], posterior: Posterior, silence: Silence):
         self.effects, self.posterior, self.silence = effects, posterior, silence
         self.unknowns, self.program = posterior.hypothesis.unknowns[0], posterior.program
-        own, entries = silence.model.entries(), posterior.hypothesis.structures[0].entries()
+        own, entries = silence.problem.model.entries(), posterior.hypothesis.structures[0].entries()
         self.mine = [k for k, u in enumerate(self.unknowns) if u.record is None and u.path not in own]
         self.path = self.unknowns[self.mine[0]].path
         part = self.path.split(".")[0] + "."

@@ -127,7 +127,7 @@ def diagnose(
     lacking = refitted.structure if term is None else decision.winner.structure.without(term)
     at = term.at if term is not None and term.at in lacking.links else None
     missing = residual(lacking, first, fitted, at)
-    silence = Silence(found.given, refitted, model, problem.records, problem.until)
+    silence = Silence(found.given, refitted, problem)
     steps.next("what would have been seen")
     if decision.verdict in ("consistent", "undecided"):  # silence is worth what would have been heard
         seen = naturally_detectable(every, silence)
@@ -193,8 +193,7 @@ class _Study:
         problem: Problem,
     ) -> _Searched:
         """Single effects fitted, the promising ones first, and pairs of them where that leaves something."""
-        _, records, until = problem
-        stands_for_the_drive = in_step(records)
+        stands_for_the_drive = in_step(problem.records)
 
         def told(trials: Sequence[Trial]) -> list[Trial]:
             return [t for t in trials if not stands_for_the_drive(t)]
@@ -217,16 +216,16 @@ class _Study:
             found = search_known(known, found, problem, self.tell)
         refitted = refit_from(found.trials, refitted, problem)
         trials, behind = [t.beside(refitted) for t in found.trials], found.behind
-        louder = noise_beyond([given, refitted, *trials], records, until)
+        louder = noise_beyond([given, refitted, *trials], problem)
         trials = [t.amid(louder) for t in (given, refitted, *trials)]
-        given, refitted, *trials = beside_chance(trials, self.model, records, until, self.key)
-        lack, alone = LackOfFit(records, until), told([given, refitted, *trials])
+        given, refitted, *trials = beside_chance(trials, problem, self.key)
+        lack, alone = LackOfFit(problem), told([given, refitted, *trials])
         effects = _beside(alone, refitted, every, lack, imposed=problem.imposed) if self.pairs else []
         if effects:
             found = search_pairs(effects, trials, known, refitted, problem, self.tell)
             trials = best_of_each([*trials, *(t.beside(refitted).amid(louder) for t in found.trials)])
             trials = [given, refitted, *trials]
-            given, refitted, *trials = beside_chance(trials, self.model, records, until, self.key)
+            given, refitted, *trials = beside_chance(trials, problem, self.key)
             done = {t.effects for t in trials}
             behind = [one for one in (*behind, *found.behind) if one.effects not in done]
         return _Searched(given, refitted, trials, behind, left_out, lack)
@@ -234,23 +233,22 @@ class _Study:
 
 def _decided(found: _Searched, problem: Problem) -> tuple[Problem, _Searched, Decision]:
     """The verdict; where no cause is named, that of records of which a share of the force is forgiven to all."""
-    _, records, until = problem
-    periods = sum(n.record.duration / n.period for n in records)
+    periods = sum(n.record.duration / n.period for n in problem.records)
 
-    def decision_of(found: _Searched, **how) -> Decision:
-        mapped = partial(stand_in, records=records, until=until)
+    def decision_of(found: _Searched, problem: Problem, **how) -> Decision:
+        mapped = partial(stand_in, problem=problem)
         return decide(found.given, found.refitted, found.trials, mapped, found.lack, periods, **how)
 
-    decision = decision_of(found, imposed=problem.imposed, untold=untold(records), in_step=in_step(records))
-    again = None if decision.winner.effects else forgiving(found.every, records, until)
+    told = {"untold": untold(problem.records), "in_step": in_step(problem.records)}
+    decision = decision_of(found, problem, imposed=problem.imposed, **told)
+    again = None if decision.winner.effects else forgiving(found.every, problem)
     if again is None:
         return problem, found, decision
-    records, (given, refitted, *trials) = again
+    problem, (given, refitted, *trials) = again
     compared, best = {t.effects for t in trials}, min(t.rung for t in found.trials)
     dropped = [LeftBehind(t.effects, t.rung - best) for t in found.trials if t.effects not in compared]
-    lack = LackOfFit(records, until)
-    found = _Searched(given, refitted, trials, [*found.behind, *dropped], found.left_out, lack)
-    return problem._replace(records=records), found, decision_of(found, forgiven=True)
+    found = _Searched(given, refitted, trials, [*found.behind, *dropped], found.left_out, LackOfFit(problem))
+    return problem, found, decision_of(found, problem, forgiven=True)
 
 
 def _believed(

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from .._threads import side_by_side
-from ..identification import Maximum, Nuisances, settle
+from ..identification import settle
 from ._adequacy import NEARLY_ALL, explained
+from ._problem import Problem
 from ._trial import Trial, predict, trial
 
 _SHARES = (0.03, 0.01, 0.003, 0.001)
@@ -18,10 +19,8 @@ _COMPARED = 12
 """Hypotheses that are compared, the best of them where a hundredth was forgiven."""
 
 
-def forgiving(
-    trials: Sequence[Trial], records: Sequence[Nuisances], until: Sequence[int]
-) -> tuple[list[Nuisances], list[Trial]] | None:
-    """The records with the share forgiven that makes the best hypothesis most probable, and the best trials there.
+def forgiving(trials: Sequence[Trial], problem: Problem) -> tuple[Problem, list[Trial]] | None:
+    """The problem with the share forgiven that makes the best hypothesis most probable, and the best trials there.
 
     From the noise alone a hypothesis that lacks a little ends at values that make up for it, or nowhere, and no two of
     them can be compared: one predicts far better than the model, and is less probable. None where that is not so, or
@@ -32,26 +31,24 @@ def forgiving(
     if not any(t.evidence < least and explained(t, refitted) >= NEARLY_ALL for t in others):
         return None
     leader = min(trials, key=lambda t: t.rung)
-    climbed = {share: _settled(leader, records, until, share) for share in _SHARES}
+    climbed = {share: settle(_forgiven(problem, share).posterior_of(leader), leader.theta) for share in _SHARES}
     best = min(climbed, key=lambda share: climbed[share].value[0])
     if climbed[best].value[0] >= leader.value:
         return None
-    noise_alone, records = leader.prediction, [replace(n, forgiven=best) for n in records]
-    posterior = leader.posterior(records, until)
-    error = predict(posterior, climbed[best].theta[0], slight=not leader.effects).error
+    noise_alone, problem = leader.prediction, _forgiven(problem, best)
+    error = predict(problem.posterior_of(leader), climbed[best].theta[0], slight=not leader.effects).error
     if np.any(error > _WORSE**2 * noise_alone.error):
         return None
     compared = [given, refitted, *sorted(others, key=lambda t: t.rung)[:_COMPARED]]
 
     def again(one: Trial) -> Trial:
-        posterior = one.posterior(records, until)
+        posterior = problem.posterior_of(one)
         found = settle(posterior, one.theta)
         return trial(posterior, found, 0, float(found.value[0]), one.label, one.effects)
 
     given, refitted, *others = [again(compared[0]), *side_by_side(again, compared[1:])]
-    return records, [given, refitted, *(t.beside(refitted) for t in others)]
+    return problem, [given, refitted, *(t.beside(refitted) for t in others)]
 
 
-def _settled(one: Trial, records: Sequence[Nuisances], until: Sequence[int], share: float) -> Maximum:
-    forgiven = [replace(n, forgiven=share) for n in records]
-    return settle(one.posterior(forgiven, until), one.theta)
+def _forgiven(problem: Problem, share: float) -> Problem:
+    return problem._replace(records=[replace(n, forgiven=share) for n in problem.records])

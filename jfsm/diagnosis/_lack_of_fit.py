@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..dynamics._plant import direction
-from ..identification import Nuisances, Posterior, missing_force
+from ..identification import Posterior, missing_force
+from ._problem import Problem
 from ._score import moved, regressed
 from ._trial import Trial, free_run
 
@@ -29,10 +30,10 @@ class Unfit(NamedTuple):
 
 
 class LackOfFit:
-    """What other shapes would gain beside trials of these records; asked again, it remembers."""
+    """What other shapes would gain beside trials of a problem; asked again, it remembers."""
 
-    def __init__(self, records: Sequence[Nuisances], until: Sequence[int]):
-        self.records, self.until = records, until
+    def __init__(self, problem: Problem):
+        self.problem = problem
         self._known: dict[int, tuple[np.ndarray, Unfit]] = {}
 
     def __call__(self, trial: Trial) -> Unfit:
@@ -42,7 +43,7 @@ class LackOfFit:
         """
         # A trial that is judged anew, beside another baseline, has the same values still.
         if id(trial.theta) not in self._known:
-            self._known[id(trial.theta)] = trial.theta, _unfit(trial, self.records, self.until)
+            self._known[id(trial.theta)] = trial.theta, _unfit(trial, self.problem)
         return self._known[id(trial.theta)][1]
 
     def known(self, trial: Trial) -> float | None:
@@ -50,10 +51,10 @@ class LackOfFit:
         return self._known[id(trial.theta)][1].nats if id(trial.theta) in self._known else None
 
 
-def _unfit(trial: Trial, records: Sequence[Nuisances], until: Sequence[int]) -> Unfit:
-    if records[0].path is not None:
+def _unfit(trial: Trial, problem: Problem) -> Unfit:
+    if problem.imposed:
         return Unfit(0.0)
-    posterior = trial.posterior(records, until)
+    posterior = problem.posterior_of(trial)
     links = list(dict.fromkeys(law.at for law in trial.laws)) or list(trial.structure.links)
     shapes = _shapes(trial, posterior, links)
     if shapes is None:

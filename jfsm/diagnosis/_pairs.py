@@ -17,7 +17,7 @@ from ..structures import (
     QuadraticStiffness,
     Structure,
 )
-from ._begin import found_in
+from ._begin import Begin, found_in
 from ._candidates import SHAPES, Candidate, Laws, natural_starts, other_delay
 from ._effect import Effect
 from ._enough import far_off
@@ -99,8 +99,7 @@ def instead(pair: Trial, effects: Sequence[Effect], problem: Problem) -> list[Ca
             found += [one.candidate for one in beside if one.promise is None]
         effect, part = pair.effects[kept], pair.parts[kept]
         for other, late in other_delay(pair.parts[changed], effects):
-            starts = (_both(problem.model, effect, part, other, late),)
-            found.append(Candidate(_ordered(effect, other), starts, begin=found_in(pair)))
+            found.append(_joined(problem.model, effect, part, other, [late], found_in(pair)))
         found += [one.candidate for one in _best(beside, _INSTEAD)]
     return [c for c in found if set(c.effects) != set(pair.effects)]
 
@@ -122,9 +121,8 @@ def crossed(found: Sequence[Trial], singles: Sequence[Trial], model: Structure) 
                 place.setdefault(effect, part)
     done, tried = {t.effects for t in found}, list[Candidate]()
     for (one, part), (other, law) in product(places[0].items(), places[1].items()):
-        effects = _ordered(one, other)
-        if effects not in done and _are_two(one, other):
-            tried.append(Candidate(effects, (_both(model, one, part, other, law),), begin=found_in(best)))
+        if _ordered(one, other) not in done and _are_two(one, other):
+            tried.append(_joined(model, one, part, other, [law], found_in(best)))
     return tried
 
 
@@ -148,8 +146,7 @@ def _beside(base: Trial, kept: int, effects: Sequence[Effect], problem: Problem)
             continue
         constant = _instead_of_an_offset(base, other)
         if constant is not None:
-            both = _both(model, effect, part, other, constant)
-            found.append(_Pair(Candidate(_ordered(effect, other), (both,), begin=begin), None))
+            found.append(_Pair(_joined(model, effect, part, other, [constant], begin), None))
         elif other.cause.is_sensor:
             # A gain lies on a ridge with the own values: it begins at those as given, and at their end of it.
             starts = natural_starts(model + part, *other, problem.first)
@@ -162,10 +159,9 @@ def _beside(base: Trial, kept: int, effects: Sequence[Effect], problem: Problem)
     for (other, shapes), nats in zip(placed, gained, strict=True):
         best = sorted(zip(shapes, nats, strict=True), key=lambda one: -one[1])[:SHAPES]
         terms = [shape.term for shape, _ in best] + laws.natural(other)
-        starts = tuple(_both(model, effect, part, other, term) for term in terms[:SHAPES])
         shape, most = best[0]
         promise = None if shape.share is None else most
-        found.append(_Pair(Candidate(_ordered(effect, other), starts, begin=begin), promise))
+        found.append(_Pair(_joined(model, effect, part, other, terms[:SHAPES], begin), promise))
     return found
 
 
@@ -184,7 +180,7 @@ def _gains(
         paths = base.structure.entries().keys() - laws.structure.entries().keys()
         replaced = Replaced(laws.forces([changed])[0], frozenset(paths))
     forces = np.concatenate([laws.forces([shape.term for shape in shapes]) for shapes in placed])
-    nats = base.evidence + gains(base, base.posterior(problem.records, problem.until), forces, replaced)
+    nats = base.evidence + gains(base, problem, forces, replaced)
     return [part.tolist() for part in np.split(nats, np.cumsum([len(shapes) for shapes in placed])[:-1])]
 
 
@@ -215,11 +211,15 @@ def _ordered(one: Effect, other: Effect) -> tuple[Effect, Effect]:
     return (one, other) if _in_order(one, other) else (other, one)
 
 
-def _both(
+def _joined(
     model: Structure,
     one: Effect,
     part: AbstractTerm | AbstractSensor,
     other: Effect,
-    law: AbstractTerm | AbstractSensor,
-) -> Structure:
-    return model + part + law if _in_order(one, other) else model + law + part
+    laws: Sequence[AbstractTerm | AbstractSensor],
+    begin: Begin,
+) -> Candidate:
+    """One effect with its part and another, which starts as each of these laws."""
+    first = _in_order(one, other)
+    starts = tuple(model + part + law if first else model + law + part for law in laws)
+    return Candidate(_ordered(one, other), starts, begin=begin)

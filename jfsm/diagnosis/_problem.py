@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ..identification import Nuisances, Posterior
+from ..identification import Hypothesis, Nuisances, Posterior
 from ..structures import Structure
 from ._begin import Begin
 from ._candidates import hypothesis
+from ._trial import Trial
 
 
 class Problem(NamedTuple):
@@ -36,3 +37,9 @@ class Problem(NamedTuple):
         """The posterior of structures that climb side by side."""
         posed = hypothesis(self.model, starts, self.records, refit=refit, begins=begins)
         return Posterior(posed, self.records, self.until)
+
+    def posterior_of(self, trial: Trial) -> Posterior:
+        """The posterior of a trial, in steps that are short enough for what was found, none longer than fitted."""
+        steps = zip(self.records, trial.steps, strict=True)
+        records = [n.resolving([trial.structure], least) for n, least in steps]
+        return Posterior(Hypothesis((trial.structure,), (trial.unknowns,)), records, self.until)

@@ -1,7 +1,6 @@
 """The force that the refitted model leaves, as points, as a map, and as a term that stands in for a law."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,9 +10,10 @@ import numpy as np
 
 from .._types import evenly_taken
 from ..dynamics._plant import direction
-from ..identification import Hypothesis, Nuisances, Posterior, missing_force
+from ..identification import Nuisances, missing_force
 from ..structures import AbstractTerm, Structure
 from ..surrogates import RKPM, HermiteTable, tabulate
+from ._problem import Problem
 from ._shown import GRID, shown_map, shown_points
 from ._trial import Trial, predict
 
@@ -60,17 +60,17 @@ def residual(structure: Structure, nuisances: Nuisances, until: int, at: tuple[i
     return Residual(links[link], d, w, f, std[link], force_map)
 
 
-def stand_in(trial: Trial, records: Sequence[Nuisances], until: Sequence[int]) -> Trial | None:
+def stand_in(trial: Trial, problem: Problem) -> Trial | None:
     """A trial with the map of what it leaves, judged like any other hypothesis.
 
     Its values stay, and the map is fixed. Held-out samples are its guard against freedom.
     """
-    found = residual(trial.structure, records[0], until[0])
+    found = residual(trial.structure, problem.first, problem.until[0])
     table = table_of(found)
     if table is None:
         return None
     structure = trial.structure + table.on(found.at)
-    posterior = Posterior(Hypothesis((structure,), (trial.unknowns,)), records, until)
+    posterior = problem.posterior_of(replace(trial, structure=structure))
     return replace(
         trial,
         label="map",

@@ -12,6 +12,7 @@ from jax import Array
 
 from .._threads import side_by_side
 from ..identification import Posterior
+from ._problem import Problem
 from ._trial import Trial
 
 _SMALL = 1e-4
@@ -76,7 +77,7 @@ def regressed(columns: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, int]
     return wanted - columns @ found, int(rank)
 
 
-def gains(trial: Trial, posterior: Posterior, forces: np.ndarray, instead_of: Replaced | None = None) -> np.ndarray:
+def gains(trial: Trial, problem: Problem, forces: np.ndarray, instead_of: Replaced | None = None) -> np.ndarray:
     """Nats that each restoring force (forces, n, dof) would gain by itself in the first record, of whatever size.
 
     None where it runs away, or would have to act the other way round. With a part that is replaced, what is gained by
@@ -89,11 +90,11 @@ def gains(trial: Trial, posterior: Posterior, forces: np.ndarray, instead_of: Re
     if not np.any(told) or (instead_of is not None and not told[0]):
         return found
     unit = every[told] / size[told, None, None]
-    unit = np.pad(unit, ((0, 0), (0, posterior.records[0].samples - unit.shape[1]), (0, 0)))
-    error, by_unknown, by_force = moved(trial, posterior, 0, unit)
+    unit = np.pad(unit, ((0, 0), (0, problem.first.samples - unit.shape[1]), (0, 0)))
+    error, by_unknown, by_force = moved(trial, problem.posterior_of(trial), 0, unit)
     before = float(np.sum(regressed(by_unknown, error)[0] ** 2))
     if instead_of is not None:
-        error = error - by_force[:, 0] * size[0] / posterior.records[0].elastic_force(trial.structure)
+        error = error - by_force[:, 0] * size[0] / problem.first.elastic_force(trial.structure)
         by_unknown = by_unknown[:, [u.path not in instead_of.paths for u in trial.unknowns]]
         by_force, told = by_force[:, 1:], told[1:]
     left, _ = regressed(by_unknown, np.column_stack([error, by_force]))

@@ -1,7 +1,6 @@
 """One hypothesis fitted: its values, its evidence, and how well it predicts."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -121,11 +120,6 @@ class Trial:
         for part in self.parts:
             model = model + part
         return model
-
-    def posterior(self, records: Sequence[Nuisances], until: Sequence[int]) -> Posterior:
-        """The posterior of its structure, on records in steps that are short enough for it, none longer than fitted."""
-        records = [n.resolving([self.structure], least) for n, least in zip(records, self.steps, strict=True)]
-        return Posterior(Hypothesis((self.structure,), (self.unknowns,)), records, until)
 
     def extended(self) -> Structure:
         """The structure without the offsets that are not significant."""
