@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import jfsm
+from jfsm.diagnosis._akin import resting
 from jfsm.diagnosis._begin import Begin, Start
-from jfsm.diagnosis._candidates import Candidate, candidates, chosen_causes, contained, hypothesis, own_paths, resting
+from jfsm.diagnosis._candidates import Candidate, candidates, chosen_causes, contained, hypothesis, own_paths
 from jfsm.diagnosis._effect import Effect
 from jfsm.identification import Nuisances, prepare
 

@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jfsm
+from jfsm.diagnosis._akin import general_cases, late_instead, special_cases
 from jfsm.diagnosis._begin import Begin, Start, begun
 from jfsm.diagnosis._candidates import (
     Candidate,
@@ -16,8 +17,6 @@ from jfsm.diagnosis._candidates import (
     candidates,
     chosen_causes,
     hypothesis,
-    late_instead,
-    special_cases,
 )
 from jfsm.diagnosis._effect import Effect
 from jfsm.diagnosis._pairs import crossed, instead, pairs
@@ -58,21 +57,26 @@ def test_an_early_channel_is_a_late_other_one():
     assert late_instead(early, begin, [force, channel, other], MODEL) == []
 
 
-@pytest.fixture(scope="module")
-def with_friction():
-    """A record of dry friction that the model lacks, with how much of it is fitted."""
+def rubbing(static: float) -> Problem:
+    """A record of dry friction that the model lacks, with how much of it is fitted; slowly it is `static` as large."""
     time = np.arange(600) * 0.06
 
     def force(t):
         return 4 * np.cos(1.1 * t) + 3 * np.sin(2.3 * t + 1) + 3 * np.cos(3.7 * t + 2)
 
     def rate(t, y):
-        return [y[1], force(t) - 9.0 * y[0] - 0.3 * y[1] - 0.8 * np.tanh(y[1] / 1e-3)]
+        friction = 0.8 * (1 + (static - 1) * np.exp(-((y[1] / 0.4) ** 2))) * np.tanh(y[1] / 1e-3)
+        return [y[1], force(t) - 9.0 * y[0] - 0.3 * y[1] - friction]
 
     x = solve_ivp(rate, (0, time[-1]), [0.0, 0.0], t_eval=time, method="LSODA", rtol=1e-8, atol=1e-10).y[0]
     noise = 0.01 * np.random.default_rng(1).standard_normal((2, time.size))
     record = jfsm.Record(time, force(time) + 4 * noise[0], x + np.std(x) * noise[1], at_rest=True)
     return Problem(MODEL, [prepare(record, MODEL)], [time.size])
+
+
+@pytest.fixture(scope="module")
+def with_friction():
+    return rubbing(static=1.0)
 
 
 @pytest.fixture(scope="module")
@@ -98,6 +102,24 @@ def test_a_special_case_that_stopped_on_its_way_is_fitted_from_the_law_that_hold
     assert 0.0 < evidence["coulomb"] - evidence["stribeck"] < 10.0
     (value,) = (t.structure.values()["coulomb@0-1.F"] for t in found.trials if t.effects == coulomb.effects)
     assert abs(value - 0.8) < 0.05
+
+
+@pytest.mark.parametrize(("static", "more"), [(1.0, []), (2.0, ["stribeck"])])
+def test_a_law_is_tried_that_holds_the_one_that_was_found_where_a_score_test_promises_more_of_it(static, more):
+    problem = rubbing(static)
+    given, refitted = fit_model(problem)
+    every = candidates(MODEL, problem.records, chosen_causes(["stribeck", "coulomb"]))
+    stribeck, coulomb = (next(c for c in every if c.effects[0].cause.id == name) for name in ("stribeck", "coulomb"))
+    alone = search([coulomb], given, refitted, problem, tell)
+    (friction,) = alone.trials
+    cases = general_cases(friction, friction.laws[0], [stribeck], problem)
+    assert [c.effects[0].cause.id for c in cases] == more
+    assert general_cases(friction, friction.laws[0], [coulomb], problem) == []
+    if more:
+        found = search_akin(alone.trials, every, alone, problem, tell)
+        (falling,) = (t for t in found.trials if t.effects == stribeck.effects)
+        assert falling.evidence > friction.evidence + 20.0
+        assert abs(falling.structure.values()["stribeck@0-1.F_static"] - 1.6) < 0.15
 
 
 def test_a_refit_that_stopped_on_its_way_is_climbed_again_from_own_values_found_beside_an_effect(with_friction, fitted):

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain, product, zip_longest
 
 import equinox as eqx
@@ -28,11 +28,9 @@ from ..identification import (
     place,
     place_together,
     scale_of,
-    with_a_rest,
     with_offsets,
 )
 from ..structures import (
-    AbstractSensor,
     AbstractTerm,
     AccelerationBias,
     AccelerationGain,
@@ -40,15 +38,13 @@ from ..structures import (
     ChannelDelay,
     Clipping,
     CoulombAsymmetric,
-    ForceDelay,
     ForceGain,
     PeriodicDisturbance,
     Preload,
-    QuadraticStiffness,
     Structure,
     causes,
 )
-from ._begin import Begin, Start, begun, own_part
+from ._begin import Begin, Start, begun
 from ._effect import Effect
 
 _START, _START_AT_PEAK = 0.1, 0.3
@@ -158,60 +154,7 @@ def contained(laws: Sequence[AbstractTerm], among: Sequence[Candidate]) -> list[
     return [c for c in alone if (c.effects[0].at, c.effects[0].cause.effect) in found]
 
 
-def special_cases(law: AbstractTerm, begin: Begin, among: Sequence[Candidate]) -> list[Candidate]:
-    """What a law that was found is for certain of its numbers, which begins from these."""
-    numbers, cases = dict(zip(_names(law), law.values, strict=True)), []
-    for c in contained([law], among):
-        start = c.starts[0]
-        placed = start.terms[-1]
-        special = {name: numbers.get(name, value) for name, value in zip(_names(placed), placed.values, strict=True)}
-        start = start.without(placed) + type(placed)(**special, at=placed.at)
-        cases.append(replace(c, starts=(start,), begin=begin))
-    return cases
-
-
-def late_instead(
-    early: AbstractTerm | AbstractSensor, begin: Begin, effects: Sequence[Effect], model: Structure
-) -> list[Candidate]:
-    """The delay of the other one of two channels, of which one was found to be early."""
-    return [Candidate((effect,), (model + late,), begin=begin) for effect, late in other_delay(early, effects)]
-
-
-def other_delay(early: AbstractTerm | AbstractSensor, effects: Sequence[Effect]) -> list[tuple[Effect, AbstractSensor]]:
-    """The channel that is late where another one seems to be early; of three, one is late as none of the others is."""
-    if not isinstance(early, ForceDelay | ChannelDelay) or early.tau >= 0:
-        return []
-    others = [e for e in effects if e.cause.effect in (ForceDelay, ChannelDelay) and e.at != early.at]
-    return [(effect, effect.cause.effect(-early.tau, at=effect.at)) for effect in others if len(others) == 1]
-
-
-def resting(
-    found: Structure,
-    law: AbstractTerm,
-    begin: Begin,
-    among: Sequence[Candidate],
-    model: Structure,
-    nuisances: Nuisances,
-) -> list[Candidate]:
-    """Laws with a rest of their own that are, about it, the quadratic spring that was found, where none tells where
-    the motion is."""
-    if not isinstance(law, QuadraticStiffness) or not _may_rest_anywhere(model, nuisances):
-        return []
-    stiffness, softer = model.stiffness_of(law.at), found.without(law).stiffness_of(law.at)
-    own = {key: start for key, start in own_part(begin).items() if not key[0].startswith("stiffness@")}
-    cases = {}
-    for c in among:
-        effect = c.effects[0]
-        if len(c.effects) > 1 or effect.at != law.at or effect.cause.is_sensor:
-            continue
-        placed = with_a_rest(effect.cause.effect, law.at, stiffness, softer - stiffness, float(law.k2))
-        if placed is not None:
-            term, rest = placed
-            cases[c.effects] = replace(c, starts=(model + term,), begin=own | _at_rest(law.at, rest))
-    return list(cases.values())
-
-
-def _may_rest_anywhere(structure: Structure, nuisances: Nuisances) -> bool:
+def may_rest_anywhere(structure: Structure, nuisances: Nuisances) -> bool:
     """Whether one degree of freedom moves about a rest of which nothing tells where it is."""
     return structure.dof == 1 and not nuisances.at_rest and not _tells_where(nuisances)
 
@@ -221,14 +164,10 @@ def _tells_where(nuisances: Nuisances) -> bool:
     return nuisances.path is not None or any(kind == "displacement" for kind, _ in nuisances.channels)
 
 
-def _at_rest(at: tuple, rest: float) -> dict[tuple[str, int | None], Start]:
+def at_rest(at: tuple, rest: float) -> dict[tuple[str, int | None], Start]:
     """Where motions begin, and are believed to, if the link at such a place is stretched by `rest`."""
     x0 = rest if at == (0, 1) else -rest
     return {("x0@1", None): Start(x0, x0)}
-
-
-def _names(law: AbstractTerm) -> list[str]:
-    return [p.name for p in law.parameters]
 
 
 class Laws:
@@ -283,13 +222,13 @@ class Laws:
 
     def about_a_rest(self, effect: Effect) -> list[Candidate]:
         """A law that may rest elsewhere than at zero, beginning there, where no channel tells where the motion is."""
-        if not _may_rest_anywhere(self.structure, self.nuisances):
+        if not may_rest_anywhere(self.structure, self.nuisances):
             return []
         found = about_a_rest(effect.cause.effect, effect.at, self.missing, self.structure)
         if found is None:
             return []
         placed, rest = found
-        return [Candidate((effect,), (self.structure + placed.term,), placed.share, _at_rest(effect.at, rest))]
+        return [Candidate((effect,), (self.structure + placed.term,), placed.share, at_rest(effect.at, rest))]
 
 
 def _shows(effect: type, kind: str, records: Sequence[Nuisances]) -> bool:

@@ -4,10 +4,7 @@ from collections.abc import Sequence
 from itertools import combinations, product
 from typing import NamedTuple
 
-import numpy as np
-
 from .._threads import side_by_side
-from ..identification import Placed
 from ..structures import (
     AbstractSensor,
     AbstractTerm,
@@ -17,12 +14,13 @@ from ..structures import (
     QuadraticStiffness,
     Structure,
 )
+from ._akin import other_delay
 from ._begin import Begin, found_in
-from ._candidates import SHAPES, Candidate, Laws, natural_starts, other_delay
+from ._candidates import SHAPES, Candidate, Laws, natural_starts
 from ._effect import Effect
 from ._enough import far_off
 from ._problem import Problem
-from ._score import Replaced, gains
+from ._score import promised
 from ._trial import Trial
 
 _BASES = 5
@@ -155,7 +153,7 @@ def _beside(base: Trial, kept: int, effects: Sequence[Effect], problem: Problem)
             to_place.append(other)
     shapes_of = list(side_by_side(lambda other: laws.placed(other, others), to_place))
     placed = [(other, shapes) for other, shapes in zip(to_place, shapes_of, strict=True) if shapes]
-    gained = _gains(base, changed, laws, [shapes for _, shapes in placed], problem)
+    gained = promised(base, changed, laws, [shapes for _, shapes in placed], problem)
     for (other, shapes), nats in zip(placed, gained, strict=True):
         best = sorted(zip(shapes, nats, strict=True), key=lambda one: -one[1])[:SHAPES]
         terms = [shape.term for shape, _ in best] + laws.natural(other)
@@ -163,25 +161,6 @@ def _beside(base: Trial, kept: int, effects: Sequence[Effect], problem: Problem)
         promise = None if shape.share is None else most
         found.append(_Pair(_joined(model, effect, part, other, terms[:SHAPES], begin), promise))
     return found
-
-
-def _gains(
-    base: Trial,
-    changed: AbstractTerm | AbstractSensor | None,
-    laws: Laws,
-    placed: Sequence[list[Placed]],
-    problem: Problem,
-) -> list[list[float]]:
-    """What each shape of each law promises beside a trial, instead of its part that is `changed` if that is a law."""
-    if problem.imposed or not placed:
-        return [[-shape.left for shape in shapes] for shapes in placed]
-    replaced = None
-    if isinstance(changed, AbstractTerm):
-        paths = base.structure.entries().keys() - laws.structure.entries().keys()
-        replaced = Replaced(laws.forces([changed])[0], frozenset(paths))
-    forces = np.concatenate([laws.forces([shape.term for shape in shapes]) for shapes in placed])
-    nats = base.evidence + gains(base, problem, forces, replaced)
-    return [part.tolist() for part in np.split(nats, np.cumsum([len(shapes) for shapes in placed])[:-1])]
 
 
 def _instead_of_an_offset(base: Trial, other: Effect) -> AbstractTerm | AbstractSensor | None:

@@ -5,13 +5,16 @@ regressed on what it does to them beside what the trial's own unknowns do.
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from jax import Array
 
 from .._threads import side_by_side
-from ..identification import Posterior
+from ..identification import Placed, Posterior
+from ..structures import AbstractSensor, AbstractTerm
+from ._candidates import Laws
 from ._problem import Problem
 from ._trial import Trial
 
@@ -103,3 +106,25 @@ def gains(trial: Trial, problem: Problem, forces: np.ndarray, instead_of: Replac
         gained = np.minimum(error @ by_force, 0.0) ** 2 / np.sum(by_force**2, 0)
     found[told] = np.nan_to_num(gained, nan=0.0, posinf=0.0)
     return (before - float(np.sum(error**2)) + found) / 2
+
+
+def promised(
+    base: Trial,
+    changed: AbstractTerm | AbstractSensor | None,
+    laws: Laws,
+    placed: Sequence[list[Placed]],
+    problem: Problem,
+) -> list[list[float]]:
+    """Evidence that each shape of each law promises beside a trial, instead of its part that is `changed` if a law.
+
+    Along an imposed motion minus the mean square force that it leaves.
+    """
+    if problem.imposed or not placed:
+        return [[-shape.left for shape in shapes] for shapes in placed]
+    replaced = None
+    if isinstance(changed, AbstractTerm):
+        paths = base.structure.entries().keys() - laws.structure.entries().keys()
+        replaced = Replaced(laws.forces([changed])[0], frozenset(paths))
+    forces = np.concatenate([laws.forces([shape.term for shape in shapes]) for shapes in placed])
+    nats = base.evidence + gains(base, problem, forces, replaced)
+    return [part.tolist() for part in np.split(nats, np.cumsum([len(shapes) for shapes in placed])[:-1])]

@@ -11,8 +11,9 @@ from .._threads import compiled_once, side_by_side
 from ..identification import LADDER, LANES, Maximum, Posterior, approach, finish, lanes_of, rungs
 from ..structures import Structure
 from ._adequacy import GATE, SIGNIFICANT, adequate, explained
+from ._akin import general_cases, late_instead, resting, special_cases
 from ._begin import Begin, found_in, own_part
-from ._candidates import Candidate, late_instead, resting, special_cases
+from ._candidates import Candidate
 from ._effect import Effect, families
 from ._enough import far_off, is_itself
 from ._pairs import crossed, instead, pairs
@@ -103,7 +104,7 @@ class _Lot:
         # Where one climbs alone it is the one that begins best, seen from where not too much is forgiven.
         best = 0
         if len(posteriors) > 1:
-            best = int(np.argmin([np.min(p.evaluate(p.initial(), ladder[-2])[0]) for p in posteriors]))
+            best = int(np.argmin([np.min(p.evaluate(p.initial(), ladder[-2:][0])[0]) for p in posteriors]))
         self.posterior, self.candidates = posteriors[best], candidates[best * lanes :][:lanes]
         yield from rungs(self.posterior, ladder)
 
@@ -208,13 +209,16 @@ def search_akin(
     """What is akin to laws that come close, special cases and others, and late channels instead of early ones, fitted
     from their numbers too.
 
-    From elsewhere they may have stopped on the way.
+    From elsewhere they may have stopped on the way, as a law has that is less probable than its special case.
     """
     effects, tried = [effect for c in every for effect in c.effects], list[Candidate]()
-    for t in close:
-        begin = found_in(t)
+    evidence = {t.effects: t.evidence for t in known.trials}
+    for t in sorted(close, key=lambda t: -t.evidence):
+        begin, done = found_in(t), {c.effects for c in tried}
+        behind = [c for c in every if c.effects not in done and evidence.get(c.effects, -math.inf) < t.evidence]
         for law in t.laws:
             tried += special_cases(law, begin, every)
+            tried += general_cases(t, law, behind, problem)
             tried += resting(t.structure, law, begin, every, problem.model, problem.first)
         for part in t.parts:
             tried += late_instead(part, begin, effects, problem.model)

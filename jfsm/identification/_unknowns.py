@@ -21,7 +21,7 @@ DEGREES_BESIDE = 4.0
 TYPICAL, TYPICAL_SPREAD = 0.15, 1.5
 """An effect's size as a share of the elastic force, and the spread of its logarithm."""
 _SHAPE_SPREAD = 1.0
-_UNUSUAL = math.log(10.0)
+_UNUSUAL = math.log(100.0)
 """Nats that an unusual sign costs: filters and converters make a channel late, only the lateness of others early."""
 _OFFSET, _SLIGHT = 0.1, 0.01
 """Offset of a channel, as a share of its spread: a nuisance, no more. That of a force or an acceleration is believed to

@@ -1,0 +1,90 @@
+"""What is akin to a law or a fault that was found, to be fitted from its numbers too."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ..identification import Nuisances, with_a_rest
+from ..structures import AbstractSensor, AbstractTerm, ChannelDelay, ForceDelay, QuadraticStiffness, Structure
+from ._adequacy import SIGNIFICANT
+from ._begin import Begin, found_in, own_part
+from ._candidates import SHAPES, Candidate, Laws, at_rest, contained, may_rest_anywhere
+from ._effect import Effect
+from ._problem import Problem
+from ._score import promised
+from ._trial import Trial
+
+
+def special_cases(law: AbstractTerm, begin: Begin, among: Sequence[Candidate]) -> list[Candidate]:
+    """What a law that was found is for certain of its numbers, which begins from these."""
+    numbers, cases = dict(zip(_names(law), law.values, strict=True)), []
+    for c in contained([law], among):
+        start = c.starts[0]
+        placed = start.terms[-1]
+        special = {name: numbers.get(name, value) for name, value in zip(_names(placed), placed.values, strict=True)}
+        start = start.without(placed) + type(placed)(**special, at=placed.at)
+        cases.append(replace(c, starts=(start,), begin=begin))
+    return cases
+
+
+def general_cases(t: Trial, law: AbstractTerm, among: Sequence[Candidate], problem: Problem) -> list[Candidate]:
+    """What a law that was found is a special case of, where a score test promises more of it in the law's place.
+
+    None along an imposed motion, of which there are no innovations.
+    """
+    wider = [c.effects[0] for c in among if len(c.effects) == 1 and c.effects[0].at == law.at]
+    wider = [effect for effect in dict.fromkeys(wider) if type(law) in effect.cause.effect.contains]
+    if not wider or problem.imposed:
+        return []
+    laws = Laws(t.structure.without(law), problem.first)
+    placed = [(effect, shapes) for effect in wider if (shapes := laws.placed(effect))]
+    cases, begin = [], found_in(t)
+    for (effect, shapes), nats in zip(placed, promised(t, law, laws, [s for _, s in placed], problem), strict=True):
+        best = sorted(zip(shapes, nats, strict=True), key=lambda one: -one[1])[:SHAPES]
+        if best[0][1] > t.evidence + SIGNIFICANT:
+            cases.append(Candidate((effect,), tuple(problem.model + one.term for one, _ in best), begin=begin))
+    return cases
+
+
+def late_instead(
+    early: AbstractTerm | AbstractSensor, begin: Begin, effects: Sequence[Effect], model: Structure
+) -> list[Candidate]:
+    """The delay of the other one of two channels, of which one was found to be early."""
+    return [Candidate((effect,), (model + late,), begin=begin) for effect, late in other_delay(early, effects)]
+
+
+def other_delay(early: AbstractTerm | AbstractSensor, effects: Sequence[Effect]) -> list[tuple[Effect, AbstractSensor]]:
+    """The channel that is late where another one seems to be early; of three, one is late as none of the others is."""
+    if not isinstance(early, ForceDelay | ChannelDelay) or early.tau >= 0:
+        return []
+    others = [e for e in effects if e.cause.effect in (ForceDelay, ChannelDelay) and e.at != early.at]
+    return [(effect, effect.cause.effect(-early.tau, at=effect.at)) for effect in others if len(others) == 1]
+
+
+def resting(
+    found: Structure,
+    law: AbstractTerm,
+    begin: Begin,
+    among: Sequence[Candidate],
+    model: Structure,
+    nuisances: Nuisances,
+) -> list[Candidate]:
+    """Laws with a rest of their own that are, about it, the quadratic spring that was found, where none tells where
+    the motion is."""
+    if not isinstance(law, QuadraticStiffness) or not may_rest_anywhere(model, nuisances):
+        return []
+    stiffness, softer = model.stiffness_of(law.at), found.without(law).stiffness_of(law.at)
+    own = {key: start for key, start in own_part(begin).items() if not key[0].startswith("stiffness@")}
+    cases = {}
+    for c in among:
+        effect = c.effects[0]
+        if len(c.effects) > 1 or effect.at != law.at or effect.cause.is_sensor:
+            continue
+        placed = with_a_rest(effect.cause.effect, law.at, stiffness, softer - stiffness, float(law.k2))
+        if placed is not None:
+            term, rest = placed
+            cases[c.effects] = replace(c, starts=(model + term,), begin=own | at_rest(law.at, rest))
+    return list(cases.values())
+
+
+def _names(law: AbstractTerm) -> list[str]:
+    return [p.name for p in law.parameters]
