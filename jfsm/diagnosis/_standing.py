@@ -109,24 +109,27 @@ def _needs_both(t: Trial, tried: Sequence[Trial], refitted: Trial) -> str:
         return ""
     singles = [alone for alone in tried if len(alone.effects) == 1]
     best = max(singles, key=lambda alone: alone.evidence, default=refitted)
-    size = _size(refitted.prediction.error)
     for alone in singles:
-        if alone is not best and alone.effects[0] not in t.effects:
-            continue
-        hides = _hides(t, alone)
-        if _shows_as_a_bias(t, alone):
-            continue
-        if adequate(t) and (hides or not np.any(unexplained(alone))):  # predictions do not tell
-            least = SIGNIFICANT if hides and adequate(alone) else _SECOND
-            if t.evidence - alone.evidence <= least:
-                return f"{alone.effects[0].label} alone is about as probable"
-            continue
-        before, after = _size(alone.prediction.excess), _size(t.prediction.excess)
-        worth = _WORTH_TO_NOISE if adequate(t) else WORTH_A_SECOND
-        share = 1.0 - (after / before) ** 2 if adequate(t) else explained(t, alone)
-        if share < GATE or before - after < worth * size or t.evidence - alone.evidence <= _SECOND:
-            return f"{alone.effects[0].label} alone explains it about as well"
+        mine = alone is best or alone.effects[0] in t.effects
+        if mine and (enough := _is_enough(alone, t, refitted)):
+            return f"{alone.effects[0].label} alone {enough}"
     return ""
+
+
+def _is_enough(alone: Trial, t: Trial, refitted: Trial) -> str:
+    """How one effect alone stands beside a pair where that is not worth more, or nothing."""
+    if _shows_as_a_bias(t, alone):
+        return ""
+    gained, hides = t.evidence - alone.evidence, _hides(t, alone)
+    if adequate(t) and (hides or not np.any(unexplained(alone))):  # predictions do not tell
+        least = SIGNIFICANT if hides and adequate(alone) else _SECOND
+        return "" if gained > least else "is about as probable"
+    before, after = _size(alone.prediction.excess), _size(t.prediction.excess)
+    share, worth = explained(t, alone), WORTH_A_SECOND
+    if adequate(t):
+        share, worth = 1.0 - (after / before) ** 2, _WORTH_TO_NOISE
+    better = before - after >= worth * _size(refitted.prediction.error)
+    return "" if share >= GATE and better and gained > _SECOND else "explains it about as well"
 
 
 def _size(powers: np.ndarray) -> float:
