@@ -122,6 +122,33 @@ def test_a_law_is_tried_that_holds_the_one_that_was_found_where_a_score_test_pro
         assert abs(falling.structure.values()["stribeck@0-1.F_static"] - 1.6) < 0.15
 
 
+def test_a_stop_that_gives_way_is_found_from_a_stop_that_was_found():
+    time, k, gap, plus, minus = np.arange(700) * 0.06, 6.0, 0.5, 4.5, 4.0
+
+    def pull(d, slider):
+        stretch = d - slider
+        return k * (stretch - np.clip(stretch, -gap, gap))
+
+    def rate(t, y):
+        d, w, slider = y
+        held = pull(d, slider)
+        slides = (held >= plus and w > 0) or (held <= -minus and w < 0)
+        return [w, -9.0 * d - 0.3 * w - np.clip(held, -minus, plus), w if slides else 0.0]
+
+    x = solve_ivp(rate, (0, time[-1]), [3.0, 0.0, 3.0], t_eval=time, max_step=0.005).y[0]
+    record = jfsm.Record(time, None, x + 0.01 * np.std(x) * np.random.default_rng(2).standard_normal(time.size))
+    problem = Problem(MODEL, [prepare(record, MODEL)], [time.size])
+    every = candidates(MODEL, problem.records, chosen_causes(["end_stop", "free_play"]))
+    stop, play = (next(c for c in every if c.effects[0].cause.id == name) for name in ("end_stop", "free_play"))
+    alone = search([stop], *fit_model(problem), problem, tell)
+    found = search_akin(alone.trials, every, alone, problem, tell)
+    (gives_way,) = (t for t in found.trials if t.effects == play.effects)
+    values = gives_way.structure.values()
+    assert gives_way.evidence > alone.trials[0].evidence + 1000.0
+    sizes = [values[f"free_play@0-1.{name}"] for name in ("k", "gap", "F_plus", "F_minus")]
+    np.testing.assert_allclose(sizes, [k, gap, plus, minus], rtol=0.1)
+
+
 def test_a_refit_that_stopped_on_its_way_is_climbed_again_from_own_values_found_beside_an_effect(with_friction, fitted):
     _, refitted = fitted
     (stiffness,) = (i for i, u in enumerate(refitted.unknowns) if u.path == "stiffness@0-1.k")

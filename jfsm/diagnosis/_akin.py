@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from ..identification import Nuisances, with_a_rest
 from ..structures import AbstractSensor, AbstractTerm, ChannelDelay, ForceDelay, QuadraticStiffness, Structure
-from ._adequacy import SIGNIFICANT
+from ._adequacy import SIGNIFICANT, adequate
 from ._begin import Begin, found_in, own_part
 from ._candidates import SHAPES, Candidate, Laws, at_rest, contained, may_rest_anywhere
 from ._effect import Effect
@@ -29,18 +29,18 @@ def special_cases(law: AbstractTerm, begin: Begin, among: Sequence[Candidate]) -
 def general_cases(t: Trial, law: AbstractTerm, among: Sequence[Candidate], problem: Problem) -> list[Candidate]:
     """What a law that was found is a special case of, where a score test promises more of it in the law's place.
 
-    None along an imposed motion, of which there are no innovations.
+    Or where the law leaves something. None along an imposed motion, of which there are no innovations.
     """
     wider = [c.effects[0] for c in among if len(c.effects) == 1 and c.effects[0].at == law.at]
     wider = [effect for effect in dict.fromkeys(wider) if type(law) in effect.cause.effect.contains]
     if not wider or problem.imposed:
         return []
     laws = Laws(t.structure.without(law), problem.first)
-    placed = [(effect, shapes) for effect in wider if (shapes := laws.placed(effect))]
+    placed = [(effect, shapes) for effect in wider if (shapes := laws.placed(effect) + laws.holding(effect, law))]
     cases, begin = [], found_in(t)
     for (effect, shapes), nats in zip(placed, promised(t, law, laws, [s for _, s in placed], problem), strict=True):
         best = sorted(zip(shapes, nats, strict=True), key=lambda one: -one[1])[:SHAPES]
-        if best[0][1] > t.evidence + SIGNIFICANT:
+        if best[0][1] > t.evidence + SIGNIFICANT or not adequate(t):
             cases.append(Candidate((effect,), tuple(problem.model + one.term for one, _ in best), begin=begin))
     return cases
 

@@ -182,6 +182,11 @@ class Laws:
         law, sign = self._law(effect), effect.cause.sign
         return place(law, self.missing, self.structure, self.scale, self.nuisances, others, sign, sides=True)
 
+    def holding(self, effect: Effect, law: AbstractTerm) -> list[Placed]:
+        """Shapes of a law that are near a special case of it; what they explain is not known."""
+        kind = effect.cause.effect
+        return [Placed(kind(**row, at=effect.at), None, math.inf) for row in kind.holding(law, self.scale)]
+
     def forces(self, terms: Sequence[AbstractTerm]) -> np.ndarray:
         """Forces (terms, n, dof) of shapes of one law along the smoothed motion."""
         return forces_of(terms, self.missing, self.structure, self.nuisances)

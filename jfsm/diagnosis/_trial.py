@@ -145,7 +145,7 @@ def ended(t: Trial) -> list[tuple[Unknown, float]]:
 
 def own_values(t: Trial) -> list[tuple[Unknown, float]]:
     """The model's own values among a trial's unknowns, and where they ended."""
-    return [(u, theta) for u, theta in ended(t) if math.isfinite(u.degrees)]
+    return [(u, theta) for u, theta in ended(t) if u.record is None and math.isfinite(u.degrees)]
 
 
 def sets(nuisances: Nuisances, until: int) -> list[np.ndarray]:

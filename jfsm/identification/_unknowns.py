@@ -23,9 +23,10 @@ TYPICAL, TYPICAL_SPREAD = 0.15, 1.5
 _SHAPE_SPREAD = 1.0
 _UNUSUAL = math.log(100.0)
 """Nats that an unusual sign costs: filters and converters make a channel late, only the lateness of others early."""
-_OFFSET, _SLIGHT = 0.1, 0.01
-"""Offset of a channel, as a share of its spread: a nuisance, no more. That of a force or an acceleration is believed to
-be slight, for a larger one is a cause: a constant force, or an accelerometer's bias."""
+_OFFSET, _SLIGHT = 0.02, 0.01
+"""Offset of a channel, as a share of its spread: a nuisance, no more. Most sensors of a displacement are zeroed, others
+are not at all; offsets of a force or an acceleration are slight, for a larger one is a cause: a constant force, or an
+accelerometer's bias."""
 _OFFSET_OF_ANSWER = 3.0
 """Doubt about the zero of a force that answers an imposed motion: a static load is part of it."""
 _START_SPREAD = 3.0
@@ -201,11 +202,13 @@ def nuisance_unknowns(structure: Structure, nuisances: Nuisances, index: int) ->
     values = structure.values()
     for kind, j in _offset_channels(structure, nuisances):
         size = float(np.std(nuisances.record.channels[(kind, j)]))
-        unit = size * (_OFFSET if kind in ("displacement", "velocity") else _SLIGHT)
-        if kind == "force" and nuisances.path is not None:
+        unit, degrees = size * _SLIGHT, math.inf
+        if kind in ("displacement", "velocity"):
+            unit, degrees = size * _OFFSET, DEGREES
+        elif kind == "force" and nuisances.path is not None:
             unit = size * _OFFSET_OF_ANSWER
         path = f"offset@{kind}-{j}.b"
-        found.append(Unknown(path, values[path] / unit, unit, False, 0.0, 1.0, record=index))
+        found.append(Unknown(path, values[path] / unit, unit, False, 0.0, 1.0, degrees, record=index))
     if not nuisances.at_rest:
         for name, guess, unit in (
             ("x0", nuisances.x0, nuisances.length),

@@ -184,6 +184,11 @@ class AbstractTerm(eqx.Module):
         return [{p.name: scale.of(p) for p in cls.parameters}]
 
     @classmethod
+    def holding(cls, law: "AbstractTerm", scale: Scale) -> list[Numbers]:
+        """Sets of numbers that are near `law`, a special case of it, for a search to begin from as well."""
+        return []
+
+    @classmethod
     def opposite(cls, numbers: Numbers) -> Numbers | None:
         """Numbers whose force is that of these with its sign changed, of a law that has them."""
         return None

@@ -188,3 +188,15 @@ class FreePlay(AbstractTerm):
             for gap in (0.05, 0.2, 0.5, 0.9)
             for stiff in (1.0, 3.0)
         ]
+
+    @classmethod
+    def holding(cls, law, scale):
+        if isinstance(law, EndStop):  # it gives way before the largest displacement
+            gap = float(law.gap)
+            found = [(gap, share * (scale.peak - gap)) for share in (0.3, 0.5, 0.7, 0.9)]
+        elif isinstance(law, Jenkins):
+            found = [(share * scale.length, float(law.slip)) for share in (0.02, 0.1)]
+        else:
+            return []
+        k = float(law.k)
+        return [{"k": k, "gap": gap, "F_plus": k * slip, "F_minus": k * slip} for gap, slip in found if slip > 0]
