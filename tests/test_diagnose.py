@@ -251,7 +251,7 @@ def test_of_two_channels_that_are_apart_in_time_the_late_one_is_named(believed, 
     assert finding.cause == {"force": "force_delay", "displacement": "channel_delay"}[late]
     assert finding.parameters["tau"].value == pytest.approx(samples * STEP, rel=0.05)
     (rival,) = finding.rivals
-    assert 0.05 < rival.probability < finding.probability, "the other may be early, though hardly any channel is"
+    assert 0.02 < rival.probability < 0.2 < finding.probability, "the other may be early, though hardly any is"
 
 
 def two_laws(x, v):

@@ -24,8 +24,8 @@ SLACKS = (0.0, 0.01, 0.05)
 """How loosely the state may be held while it is filtered; each hypothesis is judged by its best."""
 _LOST = 0.05
 """Share of a baseline's error that noise may leave of a prediction, whatever its filter says."""
-_ENOUGH = 900
-"""Samples from which a lag-one correlation is told as it is: chance then leaves a thirtieth."""
+_ENOUGH = 1600
+"""Samples from which a lag-one correlation is told as it is: chance then leaves a fortieth."""
 
 
 @dataclass(frozen=True)
