@@ -38,8 +38,6 @@ _HEAVIER = 0.03
 _WORSE = 1.5
 """Error on held-out readings, in errors of the model as given and in those that noise leaves, from which a cause makes
 the model worse."""
-_CLOSE = 4
-"""Trials whose kin are looked at where none is enough, the most probable ones."""
 Progress = Callable[[str, int, int], None]
 
 
@@ -200,21 +198,20 @@ class _Study:
         def told(trials: Sequence[Trial]) -> list[Trial]:
             return [t for t in trials if not stands_for_the_drive(t)]
 
-        def close(trials: Sequence[Trial], many: int) -> list[Trial]:
-            ranked = sorted(told([given, refitted, *trials]), key=lambda t: -t.evidence)[:many]
-            return [t for t in trials if any(t is one for one in ranked) or explained(t, refitted) >= GATE]
+        def close(trials: Sequence[Trial]) -> list[Trial]:
+            best = max(told([given, refitted, *trials]), key=lambda t: t.evidence)
+            return [t for t in trials if t is best or explained(t, refitted) >= GATE]
 
         tried, left_out = promising(every)
         found = search(tried, given, refitted, problem, self.tell)
-        enough = settled(told([given, refitted, *found.trials]), refitted)
-        if enough:
-            more = contained([law for t in close(found.trials, 1) for law in t.laws], left_out)
+        if settled(told([given, refitted, *found.trials])):
+            more = contained([law for t in close(found.trials) for law in t.laws], left_out)
         else:  # of a missing force that is ill seen regression may put the right law last
             more = [c for c in left_out if c.starts]
         if more:
             found = found.and_then(search(more, given, refitted, problem, self.tell))
             left_out = [c for c in left_out if c not in more]
-        found = search_akin(close(found.trials, 1 if enough else _CLOSE), every, found, problem, self.tell)
+        found = search_akin(close(found.trials), every, found, problem, self.tell)
         if known is not None and known.effects:
             found = search_known(known, found, problem, self.tell)
         refitted = refit_from(found.trials, refitted, problem)

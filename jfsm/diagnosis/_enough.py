@@ -6,7 +6,7 @@ import numpy as np
 
 from ..identification import Unknown, prior
 from ..structures import AccelerationBias, AccelerationGain, ForceGain, Preload
-from ._adequacy import NEARLY_ALL, NEGLIGIBLE, SIGNIFICANT, adequate, almost_all, explained, unexplained
+from ._adequacy import NEGLIGIBLE, SIGNIFICANT, adequate, almost_all, unexplained
 from ._doubt import UNFIT, UNFIT_OF_WHITE
 from ._lack_of_fit import Unfit
 from ._trial import Trial, ended, own_values
@@ -19,12 +19,10 @@ _NEAR = 0.01
 """Distance to the farthest own value, as a share of it, from which a value is there."""
 
 
-def settled(trials: Sequence[Trial], refitted: Trial) -> bool:
-    """Whether the best of them leaves nothing but noise, or one explains nearly all; its laws what they are called."""
+def settled(trials: Sequence[Trial]) -> bool:
+    """Whether the best of them leaves nothing but noise, its laws what they are called."""
     best = max(trials, key=lambda t: t.evidence)
-    return (adequate(best) and is_itself(best)) or any(
-        explained(t, refitted) >= NEARLY_ALL and is_itself(t) for t in trials if t.effects
-    )
+    return adequate(best) and is_itself(best)
 
 
 def is_itself(t: Trial) -> bool:

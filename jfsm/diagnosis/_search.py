@@ -209,20 +209,23 @@ def search_akin(
     """What is akin to laws that come close, special cases and others, and late channels instead of early ones, fitted
     from their numbers too.
 
-    From elsewhere they may have stopped on the way, as a law has that is less probable than its special case.
+    From elsewhere they may have stopped on the way, as a law has that is less probable than a special case of it; where
+    nothing leaves noise only, than any.
     """
     effects, tried = [effect for c in every for effect in c.effects], list[Candidate]()
-    evidence = {t.effects: t.evidence for t in known.trials}
-    for t in sorted(close, key=lambda t: -t.evidence):
-        begin, done = found_in(t), {c.effects for c in tried}
-        behind = [c for c in every if c.effects not in done and evidence.get(c.effects, -math.inf) < t.evidence]
+    for t in close:
+        begin = found_in(t)
         for law in t.laws:
             tried += special_cases(law, begin, every)
-            tried += general_cases(t, law, behind, problem)
             tried += resting(t.structure, law, begin, every, problem.model, problem.first)
         for part in t.parts:
             tried += late_instead(part, begin, effects, problem.model)
-    return _from_there(tried, known, problem, tell)
+    evidence, wider = {t.effects: t.evidence for t in known.trials}, list[Candidate]()
+    for t in sorted(close if any(map(adequate, close)) else known.trials, key=lambda t: -t.evidence):
+        done = {c.effects for c in wider}
+        behind = [c for c in every if c.effects not in done and evidence.get(c.effects, -math.inf) < t.evidence]
+        wider += [c for law in t.laws for c in general_cases(t, law, behind, problem)]
+    return _from_there(tried + wider, known, problem, tell)
 
 
 def search_known(found: Trial, others: Found, problem: Problem, tell: Tell) -> Found:
