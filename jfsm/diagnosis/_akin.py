@@ -38,10 +38,10 @@ def general_cases(t: Trial, law: AbstractTerm, among: Sequence[Candidate], probl
     laws = Laws(t.structure.without(law), problem.first)
     placed = [(effect, shapes) for effect in wider if (shapes := laws.placed(effect) + laws.holding(effect, law))]
     cases, begin = [], found_in(t)
-    for (effect, shapes), nats in zip(placed, promised(t, law, laws, [s for _, s in placed], problem), strict=True):
-        best = sorted(zip(shapes, nats, strict=True), key=lambda one: -one[1])[:SHAPES]
+    for (effect, _), best in zip(placed, promised(t, law, laws, [s for _, s in placed], problem), strict=True):
         if best[0][1] > t.evidence + SIGNIFICANT or not adequate(t):
-            cases.append(Candidate((effect,), tuple(problem.model + one.term for one, _ in best), begin=begin))
+            starts = tuple(problem.model + shape.term for shape, _ in best[:SHAPES])
+            cases.append(Candidate((effect,), starts, begin=begin))
     return cases
 
 

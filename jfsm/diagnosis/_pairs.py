@@ -153,10 +153,9 @@ def _beside(base: Trial, kept: int, effects: Sequence[Effect], problem: Problem)
             to_place.append(other)
     shapes_of = list(side_by_side(lambda other: laws.placed(other, others), to_place))
     placed = [(other, shapes) for other, shapes in zip(to_place, shapes_of, strict=True) if shapes]
-    gained = promised(base, changed, laws, [shapes for _, shapes in placed], problem)
-    for (other, shapes), nats in zip(placed, gained, strict=True):
-        best = sorted(zip(shapes, nats, strict=True), key=lambda one: -one[1])[:SHAPES]
-        terms = [shape.term for shape, _ in best] + laws.natural(other)
+    ranked = promised(base, changed, laws, [shapes for _, shapes in placed], problem)
+    for (other, _), best in zip(placed, ranked, strict=True):
+        terms = [shape.term for shape, _ in best[:SHAPES]] + laws.natural(other)
         shape, most = best[0]
         promise = None if shape.share is None else most
         found.append(_Pair(_joined(model, effect, part, other, terms[:SHAPES], begin), promise))

@@ -114,17 +114,25 @@ def promised(
     laws: Laws,
     placed: Sequence[list[Placed]],
     problem: Problem,
-) -> list[list[float]]:
-    """Evidence that each shape of each law promises beside a trial, instead of its part that is `changed` if a law.
+) -> list[list[tuple[Placed, float]]]:
+    """The shapes of each law, best first, with the evidence that they promise beside a trial, instead of its part that
+    is `changed` if that is a law.
 
-    Along an imposed motion minus the mean square force that it leaves.
+    Along an imposed motion with minus the mean square force that they leave.
     """
-    if problem.imposed or not placed:
-        return [[-shape.left for shape in shapes] for shapes in placed]
+    if not placed:
+        return []
+    if problem.imposed:
+        return [_best_first(shapes, [-shape.left for shape in shapes]) for shapes in placed]
     replaced = None
     if isinstance(changed, AbstractTerm):
         paths = base.structure.entries().keys() - laws.structure.entries().keys()
         replaced = Replaced(laws.forces([changed])[0], frozenset(paths))
     forces = np.concatenate([laws.forces([shape.term for shape in shapes]) for shapes in placed])
     nats = base.evidence + gains(base, problem, forces, replaced)
-    return [part.tolist() for part in np.split(nats, np.cumsum([len(shapes) for shapes in placed])[:-1])]
+    parts = np.split(nats, np.cumsum([len(shapes) for shapes in placed])[:-1])
+    return [_best_first(shapes, part.tolist()) for shapes, part in zip(placed, parts, strict=True)]
+
+
+def _best_first(shapes: Sequence[Placed], promise: Sequence[float]) -> list[tuple[Placed, float]]:
+    return sorted(zip(shapes, promise, strict=True), key=lambda one: -one[1])
