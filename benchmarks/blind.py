@@ -31,6 +31,7 @@ from tests.blind import (  # noqa: E402
     PAIRS,
     ChainChallenge,
     Challenge,
+    UnfairError,
     draw,
     draw_chain,
     draw_two,
@@ -49,8 +50,14 @@ Drawing = dict[str, Any]
 
 
 def examine(seed: int, drawing: Drawing) -> Row:
-    """The challenge of a seed put to the library, as one row; an exception becomes the row's "error"."""
-    challenge = drawn(seed, drawing)
+    """The challenge of a seed put to the library, as one row; an exception becomes the row's "error".
+
+    Of a seed that gives no fair challenge the row says that alone, as "unfair".
+    """
+    try:
+        challenge = drawn(seed, drawing)
+    except UnfairError as problem:
+        return {"seed": seed, "unfair": str(problem)}
     return question(challenge) | {"drawing": drawing} | attempted(lambda: diagnosed(challenge))
 
 
@@ -203,6 +210,9 @@ def run(seeds: Sequence[int], drawing: Drawing, jobs: int, out: Path | None, say
     begin = time.perf_counter()
     try:
         for done, row in enumerate(answers(missing, drawing, jobs) if missing else (), start=1):
+            if "unfair" in row:
+                say(f"seed {row['seed']} is left out: {row['unfair']}")
+                continue
             rows.append(row)
             keep(row, out)
             say(progress_line(row, done, len(missing), time.perf_counter() - begin))

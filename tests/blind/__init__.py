@@ -16,5 +16,6 @@ from .challenge import draw as draw
 from .dirt import DIRT as DIRT
 from .dirt import soiled as soiled
 from .laws import OUTSIDE as OUTSIDE
+from .plants import UnfairError as UnfairError
 from .two import PAIRS as PAIRS
 from .two import draw_two as draw_two

@@ -24,7 +24,7 @@ from .challenge import (
 from .drives import DRIVES, Drive
 from .laws import LAWS, Law, NoLaw, Scene
 from .laws.base import log_uniform
-from .plants import EscapeError, Plant
+from .plants import EscapeError, Plant, UnfairError
 from .sensors import DELAYS, RESPONSES, SENSORS, UNITS, Sensor, with_noise
 from .two import SHARES
 
@@ -293,7 +293,7 @@ def _fair_question(rng: np.random.Generator, cause: str, excitation: str, channe
             seen = _seen(bench, at, motion, cause)
             if seen >= LEAST_SEEN:
                 return _Question(bench, at, law, start, motion, _roughly_known(rng, bench.chain), seen)
-    raise RuntimeError(f"no fair {cause} under {excitation} in 100 chains; its law's draw must be made to suit it.")
+    raise UnfairError(f"no fair {cause} under {excitation} in 100 chains; its law's draw must be made to suit it.")
 
 
 def _drawn_bench(rng: np.random.Generator, cause: str, excitation: str, channel_set: str) -> _Bench:

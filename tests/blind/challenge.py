@@ -11,7 +11,7 @@ from .beliefs import WRONG_VALUES, roughly_known, wrong_value
 from .drives import DRIVES, Drive
 from .exact import integrate
 from .laws import FIRST_LAWS, LAWS, OUTSIDE, Law, NoLaw, Scene
-from .plants import EscapeError, Motion, Plant, State
+from .plants import EscapeError, Motion, Plant, State, UnfairError
 from .sensors import DELAYS, FIRST_SENSORS, SENSORS, UNITS, Channels, Sensor, with_noise
 from .sketch import sketch
 
@@ -294,7 +294,7 @@ def _fair_question(rng: np.random.Generator, cause: str, excitation: str) -> tup
                 continue
             if is_fair(law, Scene(plant, drive, motion), law.shares):
                 return plant, drive, begin, law, motion
-    raise RuntimeError(f"no fair {cause} under {excitation} in 50 plants; its law's draw must be made to suit it.")
+    raise UnfairError(f"no fair {cause} under {excitation} in 50 plants; its law's draw must be made to suit it.")
 
 
 def is_fair(law: Law, scene: Scene, shares: tuple[float, float]) -> bool:

@@ -14,6 +14,10 @@ class EscapeError(ArithmeticError):
     """The motion left the region in which the plant is a fair question."""
 
 
+class UnfairError(RuntimeError):
+    """A seed whose cause and excitation never give a challenge of the wanted size."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Plant:
     """Mass [kg], stiffness [N/m], damping [N s/m]."""

@@ -20,7 +20,7 @@ from .laws import LAWS, NoLaw, Scene
 from .laws.damping import Coulomb
 from .laws.memory import DelayedForce
 from .laws.stiffness import DoubleWell, EndStop
-from .plants import EscapeError
+from .plants import EscapeError, UnfairError
 from .sensors import SENSORS
 from .test_laws import FORCES, RATES
 from .two import SHARES
@@ -396,7 +396,7 @@ def test_a_law_that_never_gives_a_fair_question_is_reported(monkeypatch: pytest.
         raise EscapeError("too large")
 
     monkeypatch.setattr(chain_challenge, "_drawn_law", unfair)
-    with pytest.raises(RuntimeError, match="no fair coulomb under harmonic in 100 chains"):
+    with pytest.raises(UnfairError, match="no fair coulomb under harmonic in 100 chains"):
         draw_chain(0, causes="coulomb", excitation="harmonic")
 
 

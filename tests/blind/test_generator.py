@@ -20,7 +20,7 @@ from .laws import FIRST_LAWS, Law, NoLaw, Scene
 from .laws.base import LARGEST_SHARE, SMALLEST_SHARE
 from .laws.damping import Coulomb
 from .laws.stiffness import CubicHardening, CubicSoftening
-from .plants import EscapeError, Motion, Plant
+from .plants import EscapeError, Motion, Plant, UnfairError
 from .sensors import FIRST_SENSORS
 from .sketch import sketch
 
@@ -390,7 +390,7 @@ def test_a_law_that_never_gives_a_fair_question_is_reported(monkeypatch: pytest.
             return 0.0
 
     monkeypatch.setitem(challenge_module.LAWS, "cubic_hardening", Impossible)
-    with pytest.raises(RuntimeError, match="no fair cubic_hardening under harmonic in 50 plants"):
+    with pytest.raises(UnfairError, match="no fair cubic_hardening under harmonic in 50 plants"):
         draw(0, causes="cubic_hardening", excitation="harmonic")
 
 

@@ -425,6 +425,21 @@ def test_a_repeated_call_examines_only_the_seeds_that_are_missing(tmp_path: Path
     assert len(blind.run(range(1, 4), drawing, 1, out, told.append)) == 3 and asked == [0, 1, 2, 3]
 
 
+def test_a_seed_without_a_fair_challenge_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def drawn(seed, drawing):
+        if seed == 1:
+            raise blind.UnfairError("no fair coulomb")
+        return blind.draw(seed, causes="none", channels="x", excitation="free_decay")
+
+    monkeypatch.setattr(blind, "drawn", drawn)
+    monkeypatch.setattr(blind, "diagnosed", lambda challenge: None)
+    monkeypatch.setattr(blind, "answers", lambda seeds, drawing, jobs: (blind.examine(seed, drawing) for seed in seeds))
+    out, told = tmp_path / "rows.jsonl", []
+    assert [row["seed"] for row in blind.run(range(3), {}, 1, out, told.append)] == [0, 2]
+    assert len(out.read_text().splitlines()) == 2
+    assert told[1] == "seed 1 is left out: no fair coulomb"
+
+
 def test_what_is_done_is_kept_when_the_examination_is_interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     def answers(seeds, drawing, jobs):
         yield row("none", "consistent", seed=0, drawing=drawing)

@@ -13,7 +13,7 @@ from .challenge import LEAST_LEFT, can_tell
 from .drives import Silence
 from .exact import integrate
 from .laws import LAWS, Both, NoLaw, Scene
-from .plants import EscapeError, Motion, Plant
+from .plants import EscapeError, Motion, Plant, UnfairError
 from .sensors import SENSORS
 from .test_laws import truth_of
 from .two import LARGEST_OVERLAP, SHARES, Pair, family, overlap
@@ -211,5 +211,5 @@ def test_a_pair_that_never_gives_a_fair_question_is_reported(monkeypatch: pytest
         raise EscapeError("too large")
 
     monkeypatch.setattr(two_module, "_question", unfair)
-    with pytest.raises(RuntimeError, match="no fair coulomb with cubic_hardening under harmonic in 50 plants"):
+    with pytest.raises(UnfairError, match="no fair coulomb with cubic_hardening under harmonic in 50 plants"):
         draw_two(0, pairs=[("cubic_hardening", "coulomb")], excitation="harmonic")

@@ -25,7 +25,7 @@ from .challenge import (
 from .drives import Drive
 from .laws import LAWS, Both, Law, Scene
 from .laws.base import log_uniform
-from .plants import EscapeError, Motion, Plant, State
+from .plants import EscapeError, Motion, Plant, State, UnfairError
 from .sensors import SENSORS, UNITS, Channels, Sensor, with_noise
 from .sketch import sketch
 
@@ -179,7 +179,7 @@ def _fair_question(rng: np.random.Generator, pair: Pair, excitation: str, kinds:
                 return _question(rng, pair, Scene(plant, drive, plain), start, kinds)
             except EscapeError:
                 continue
-    raise RuntimeError(f"no fair {pair[0]} with {pair[1]} under {excitation} in 50 plants; leave the pair out.")
+    raise UnfairError(f"no fair {pair[0]} with {pair[1]} under {excitation} in 50 plants; leave the pair out.")
 
 
 def _question(rng: np.random.Generator, pair: Pair, scene: Scene, start: State, kinds: Sequence[str]) -> _Question:
