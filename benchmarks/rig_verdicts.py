@@ -6,8 +6,10 @@ Each rig is put into a folder as its owner would have it, a record and a rough m
 values (of the roll decay from the owner's potential-flow simulation), and `jfsm diagnose` judges it. A line: verdict,
 causes, error on held-out readings before and after, seconds.
 
-silverbox: a cubic spring. bouc_wen: memory, no map of displacement and velocity. emps: friction. roll_decay: quadratic
-damping beside what the simulation has. springs, coupled_springs, and the balls: nothing that the record could support.
+silverbox, silverbox_levels: a cubic spring. bouc_wen: memory, no map of displacement and velocity. emps: friction.
+roll_decay: quadratic damping beside what the simulation has. pendulum: softening, as a sine. mr_damper: a step in
+velocity with a loop. friction_damper: memory. arm: friction in both joints. beam: a joint that depends on amplitude.
+f16: nothing beyond other modes. springs, coupled_springs, and the balls: nothing that the record could support.
 """
 
 import argparse
@@ -23,6 +25,8 @@ from typing import NamedTuple
 
 import jax
 import numpy as np
+from scipy.io import loadmat
+from scipy.signal import butter, savgol_filter, sosfiltfilt
 
 jax.config.update("jax_enable_x64", True)
 
@@ -34,9 +38,9 @@ COMMAND = (sys.executable, "-c", "from jfsm.cli import app; app()")
 class Rig(NamedTuple):
     """A record with the model that is believed, up to its own values, which are those of `fitted_to`."""
 
-    record: jfsm.Record
+    record: jfsm.Record | list[jfsm.Record]
     believed: jfsm.Structure
-    held: jfsm.Record | float = 0.3
+    held: jfsm.Record | list[jfsm.Record] | float = 0.3
     fitted_to: jfsm.Record | None = None
 
 
@@ -99,18 +103,124 @@ def ball(data: Path, name: str) -> Rig:
     return Rig(first, jfsm.Structure([1.0], [jfsm.Preload(9.81, at=(0, 1))]), second)
 
 
+def silverbox_levels(data: Path) -> Rig:
+    """The mean of the steady periods at 100 mV fitted, at 50 mV held out; every second sample."""
+
+    def level(millivolts: int) -> jfsm.Record:
+        folder = data / "silverbox_levels"
+        drive = jfsm.read(folder / f"SNJP_um_full_FNSI_{millivolts}.mat", force="um", units={"um": "V"})
+        answer = folder / f"SNJP_ym_full_FNSI_{millivolts}.mat"
+        seen = jfsm.read(answer, displacement="ym", units={"ym": "V"}, rate=drive.sample_rate)
+        return jfsm.align([drive, seen]).folded(transient=5).resample(drive.sample_rate / 2)
+
+    omega = 2 * np.pi * 69.0
+    return Rig(level(100), jfsm.Structure.sdof(1 / omega**2, 1.0, 0.1 / omega), level(50))
+
+
+def pendulum(data: Path) -> Rig:
+    """36 s fitted, the next 36 s held out; a unit inertia that is believed to swing as at small angles."""
+    path = data / "pendulum_large_angle" / "data31.csv"
+    record = jfsm.read(path, displacement="angle", units={"angle": "rad"}).resample(100.0)
+    begin = record.time[0]
+    held = record.since(begin + 36.0).until(begin + 72.0)
+    return Rig(record.until(begin + 36.0), jfsm.Structure.sdof(1.0, 6.0**2, 0.05), held)
+
+
+def device(stiffness: float, damping: float) -> jfsm.Structure:
+    """A spring and a dashpot without a mass, of which nothing is known."""
+    parts = [jfsm.LinearStiffness(stiffness, at=(0, 1)), jfsm.LinearDamping(damping, at=(0, 1))]
+    return jfsm.Structure([0.0], parts).uncertain(stiffness=1.0, damping=1.0)
+
+
+def mr_damper(data: Path) -> Rig:
+    """At the highest current; one record fitted, three held out."""
+    path, units = data / "mr_damper" / "mr_series_B.npz", {"displacement": "mm", "force": "N"}
+
+    def run(number: int) -> jfsm.Record:
+        channels = {"displacement": f"x_B_{number}", "force": f"F_B_{number}"}
+        return jfsm.read(path, **channels, units=units, rate=100.0, drive="motion").since(1.0)
+
+    return Rig(run(1), device(5e3, 5e3), [run(3), run(5), run(10)])
+
+
+def friction_damper(data: Path) -> Rig:
+    """At 1 Hz; half an inch and an inch and a half fitted, an inch held out; every fourth sample."""
+    path = data / "friction_damper_brfd" / "brfd_harmonic_36lb.npz"
+    units = {"displacement": "in", "force": "kip", "velocity": "in/s"}
+
+    def run(inches: str) -> jfsm.Record:
+        x, force, v = (f"f1Hz_a{inches}in[{column}]" for column in range(3))
+        record = jfsm.read(path, displacement=x, force=force, velocity=v, units=units, rate=1024.0, drive="motion")
+        return record.resample(256.0)
+
+    return Rig([run("0p5"), run("1p5")], device(3e5, 1e5), run("1"))
+
+
+def arm(data: Path) -> Rig:
+    """Both joints of an arm along its own motion, the torque of rigid links and weight taken off by least squares."""
+    units = {"force": "N m", "displacement": "rad", "velocity": "rad/s"}
+    record = jfsm.read(
+        data / "arm_two_joint" / "arm_154220.npz", force="tau_meas", displacement="pos_meas", velocity="vel_meas",
+        units=units,
+    ).resample(500.0)  # fmt: skip
+    torque, q, w = record.force, record.displacement, record.velocity
+    a = savgol_filter(w, 15, 2, deriv=1, delta=record.dt, axis=0)
+    none, cos, sin = np.zeros(len(record)), np.cos(q[:, 1]), np.sin(q[:, 1])
+    tip = q[:, 0] + q[:, 1]
+    rigid = [  # inertia of both links, their coupling, inertia of the second and of its drive, weight of both
+        (a[:, 0], none),
+        (cos * (2 * a[:, 0] + a[:, 1]) - sin * w[:, 1] * (2 * w[:, 0] + w[:, 1]), cos * a[:, 0] + sin * w[:, 0] ** 2),
+        (a.sum(1), a.sum(1)),
+        (none, a[:, 1]),
+        (np.sin(q[:, 0]), none),
+        (np.sin(tip), np.sin(tip)),
+    ]
+    columns = np.stack([np.concatenate(pair) for pair in rigid], 1)
+    told = columns @ np.linalg.lstsq(columns, np.concatenate(torque.T), rcond=None)[0]
+    rest = torque - told.reshape(2, -1).T
+    left = jfsm.Record(record.time, force=rest, displacement=q, velocity=w, units=units, drive="motion")
+    joints = [jfsm.LinearDamping(0.01, at=at) for at in ((0, 1), (0, 2))]
+    return Rig(left, jfsm.Structure([0.0, 0.0], joints).uncertain(damping=1.0))
+
+
+def beam(data: Path) -> Rig:
+    """The first bending mode of a bolted beam as it rings down, filtered out of an accelerometer; a unit mass."""
+    struck = loadmat(data / "brake_reuss_beam" / "HammerImpact.mat", squeeze_me=True)["HIdata"]
+    time, a = (np.asarray(struck[name].item(), float) for name in ("time", "acc1"))
+    mode = sosfiltfilt(butter(4, (60.0, 110.0), "bandpass", fs=12800.0, output="sos"), a)
+    kept = slice(np.searchsorted(time, 0.1), np.searchsorted(time, 3.1), 16)
+    omega = 2 * np.pi * 80.5
+    record = jfsm.Record(time[kept], acceleration=mode[kept], units={"acceleration": "m/s^2"})
+    return Rig(record, jfsm.Structure.sdof(1.0, omega**2, 0.003 * omega))
+
+
+def f16(data: Path) -> Rig:
+    """The payload on the wing that carries it; the mean of the steady periods, a unit mass on the mount."""
+    loaded = np.load(data / "f16_gvt" / "f16_fullmsine_level1.npz")
+    wing, payload = (loaded["acc"][8192:, j].reshape(8, 8192).mean(0) for j in (1, 2))
+    units = {"base_acceleration": "m/s^2", "acceleration": "m/s^2"}
+    record = jfsm.Record(np.arange(8192) / 400.0, base_acceleration=wing, acceleration=payload, units=units)
+    omega = 2 * np.pi * 9.0
+    return Rig(record.resample(100.0), jfsm.Structure.sdof(1.0, omega**2, 0.04 * omega))
+
+
 RIGS: dict[str, Callable[[Path], Rig]] = {
-    "silverbox": silverbox, "bouc_wen": bouc_wen, "emps": emps, "roll_decay": roll_decay, "springs": springs,
-    "coupled_springs": coupled_springs,
+    "silverbox": silverbox, "silverbox_levels": silverbox_levels, "bouc_wen": bouc_wen, "emps": emps,
+    "roll_decay": roll_decay, "pendulum": pendulum, "mr_damper": mr_damper, "friction_damper": friction_damper,
+    "arm": arm, "beam": beam, "f16": f16, "springs": springs, "coupled_springs": coupled_springs,
     **{name.lower().replace(" ", "_"): functools.partial(ball, name=name)
        for name in ("Golf Ball", "Bowling Ball", "Baseball")},
 }  # fmt: skip
 
 
-def written(record: jfsm.Record, path: Path) -> list[str]:
-    """The record in a file, and the command line's words for it."""
-    record.write(path)
-    return [str(path)]
+def written(records: jfsm.Record | list[jfsm.Record], folder: Path) -> list[str]:
+    """The records in files of a folder, and the command line's words for them."""
+    folder.mkdir(exist_ok=True)
+    paths = []
+    for number, record in enumerate([records] if isinstance(records, jfsm.Record) else records, start=1):
+        paths.append(str(folder / f"{number}.npz"))
+        record.write(paths[-1])
+    return paths
 
 
 def command(*words: str) -> str:
@@ -126,12 +236,20 @@ def judged(rig: Rig, folder: Path) -> dict:
     folder.mkdir(parents=True, exist_ok=True)
     rough, model, page, numbers = (str(folder / f) for f in ("rough.toml", "model.toml", "page.html", "verdict.json"))
     rig.believed.save(rough)
-    record = written(rig.record, folder / "record.npz")
-    known = record if rig.fitted_to is None else written(rig.fitted_to, folder / "fitted.npz")
+    records = written(rig.record, folder / "records")
+    known = records if rig.fitted_to is None else written(rig.fitted_to, folder / "fitted")
     command("fit", *known, "--model", rough, "--out", model)
-    held = written(rig.held, folder / "held.npz")[0] if isinstance(rig.held, jfsm.Record) else str(rig.held)
-    outputs = ("--report", page, "--json", numbers, "--holdout", held, "--key", "0")
-    (folder / "said.txt").write_text(command("diagnose", *record, "--model", model, *outputs))
+    held = [str(rig.held)] if isinstance(rig.held, float) else written(rig.held, folder / "held")
+    outputs = (
+        "--report",
+        page,
+        "--json",
+        numbers,
+        "--key",
+        "0",
+        *(word for one in held for word in ("--holdout", one)),
+    )
+    (folder / "said.txt").write_text(command("diagnose", *records, "--model", model, *outputs))
     return json.loads(Path(numbers).read_text())
 
 

@@ -30,6 +30,7 @@ from ._adequacy import (
 )
 from ._doubt import UNFIT, doubt
 from ._effect import families
+from ._enough import WORTH_A_SECOND
 from ._lack_of_fit import Unfit
 from ._standing import special_case, why_not
 from ._trial import Trial
@@ -107,8 +108,10 @@ def decide(
 
         def doubt_of(t: Trial) -> float:
             unfit = lack_of_fit(t)
-            # Where none is right much of the rest has a shape, and says nothing against a law that explains nearly all.
-            return doubt(t, ranked.gained(t, winner), unfit._replace(share=0.0) if forgiven else unfit)
+            # Where none is right much of the rest has a shape, and says nothing against a law that explains nearly all;
+            # nor does a trace that no second effect would be named for.
+            shapeless = forgiven or explained(t, refitted) > 1.0 - WORTH_A_SECOND**2
+            return doubt(t, ranked.gained(t, winner), unfit._replace(share=0.0) if shapeless else unfit)
 
         winner, against = ranked.of_right_shape(winner, doubt_of)
         if against := untold(winner) or _unseen(winner, refitted) or against:
@@ -130,7 +133,7 @@ def decide(
     elif verdict == "unnamed" and mapped is not None:
         # The map stands for the whole effect, not for what a law left that was not right.
         whole = mapped if winner is refitted else stand_in(refitted)
-        winner = mapped if whole is None else whole
+        winner = whole if whole is not None and explained(whole, refitted) >= GATE else mapped
         ranked.kappa[id(winner)] = explained(winner, refitted)
     elif verdict == "undecided" and winner.effects:
         winner = refitted

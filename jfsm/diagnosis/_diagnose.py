@@ -296,7 +296,7 @@ def _confirmed(
 
 def _speaks_against(gain: Gain, decision: Decision) -> str:
     """Why runs on held-out readings speak against what was found, or nothing."""
-    if decision.verdict == "cause" and gain.after > _WORSE * max(gain.before, gain.floor):
+    if decision.verdict in ("cause", "unnamed") and gain.after > _WORSE * max(gain.before, gain.floor):
         return "runs worse on held-out readings than the model as given"
     unsure = decision.verdict == "cause" and decision.share(decision.winner) < 0.5 and not adequate(decision.winner)
     if unsure and not (gain.closable and gain.significant):

@@ -1,5 +1,6 @@
 """Whether the search has found enough, or what else is worth a try."""
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -15,6 +16,8 @@ WORTH_A_SECOND = 0.03
 """Share of the refit's error by which two effects must predict better than either of them alone."""
 MAY_HIDE = (ForceGain, AccelerationGain, Preload, AccelerationBias)
 """Effects that own values and offsets may stand for."""
+_HARDLY_TRUSTED = math.log(2.0)
+"""Width of an own value's law from which it may be nothing: its owner trusts it to the whole of itself."""
 _NEAR = 0.01
 """Distance to the farthest own value, as a share of it, from which a value is there."""
 
@@ -34,12 +37,13 @@ def far_off(trial: Trial) -> set[str]:
     """Own values of a trial that went as far as they may: it is another structure's force that they make up for.
 
     So it is with a sensor's fault. Damping may go: a model without friction often states as viscous what friction
-    takes.
+    takes. And so may what its owner hardly trusts.
     """
     faults = {effect.cause.effect.kind for effect in trial.effects if effect.cause.is_sensor}
     own = [*own_values(trial), *((u, theta) for u, theta in ended(trial) if u.path.split("@")[0] in faults)]
-    low = {u.path for u, theta in own if theta < u.low + _NEAR and not u.path.startswith("damping@")}
-    return low | {u.path for u, theta in own if theta > u.high - _NEAR}
+    low = [u for u, theta in own if theta < u.low + _NEAR and not u.path.startswith("damping@")]
+    high = {u.path for u, theta in own if theta > u.high - _NEAR}
+    return high | {u.path for u in low if u.width < _HARDLY_TRUSTED}
 
 
 def something_left(

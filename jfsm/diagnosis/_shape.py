@@ -11,6 +11,9 @@ from ._residual import Residual
 _DEGREE = 9
 """Of the polynomials that stand for the parts that follow one of displacement and velocity."""
 _READINGS = 2000
+_APART = 1e-3
+"""Singular value, as a share of the largest, from which polynomials differ along a motion: along a steady vibration, an
+ellipse, even ones in displacement and in velocity are the same."""
 _MOST, _MUCH = 0.7, 0.3
 """Shares from which a part is most of a force, or much of it."""
 _BENT = 0.05
@@ -64,7 +67,7 @@ def shape_of(found: Residual) -> Shape | None:
     u, z = d / np.max(np.abs(d)), w / np.max(np.abs(w))
     along = [legvander(axis, _DEGREE)[:, 1:] for axis in (u, z)]
     columns = np.column_stack([np.ones_like(u), *along])
-    numbers = np.linalg.lstsq(columns, mapped, rcond=None)[0]
+    numbers = np.linalg.lstsq(columns, mapped, rcond=_APART)[0]
     rest = float(np.var(mapped - columns @ numbers))
     sizes = np.split(numbers[1:], 2)
     curves = [

@@ -13,7 +13,9 @@ from ._nuisances import Nuisances
 TRUST = {"stiffness": 0.02, "damping": 0.25, "mass": 0.01}
 """How far own values are off as a rule, where the owner does not say: masses are weighed, damping is guessed."""
 _REACH = {"stiffness": math.log(5.0), "mass": math.log(5.0), "damping": math.log(50.0)}
-"""Logarithm of the factor by which an own value may be off; beyond it another structure was measured."""
+"""Logarithm of the factor by which an own value may be off; beyond it another structure was measured,"""
+_WIDTHS = 5.0
+"""or so many times the logarithm of what it is trusted to."""
 DEGREES = 1.5
 """Degrees of freedom of Student's law for own values: right to some per cent as a rule, but far off when wrong."""
 DEGREES_BESIDE = 4.0
@@ -141,8 +143,9 @@ def own_unknown(structure: Structure, path: str, trust: Mapping[str, float], deg
         raise ValueError(
             f"{path} is 0 and cannot be refitted as a share of itself; state a small value, or leave the term out."
         )
-    reach = _REACH.get(kind, _REACH["damping"])
-    return Unknown(path, 0.0, value, True, 0.0, math.log1p(width), degrees, low=-reach, high=reach)
+    width = math.log1p(width)
+    reach = max(_REACH.get(kind, _REACH["damping"]), _WIDTHS * width)
+    return Unknown(path, 0.0, value, True, 0.0, width, degrees, low=-reach, high=reach)
 
 
 def free_unknown(structure: Structure, path: str, nuisances: Nuisances) -> Unknown:
