@@ -157,14 +157,15 @@ def friction_damper(data: Path) -> Rig:
 
 
 def arm(data: Path) -> Rig:
-    """Both joints of an arm along its own motion, the torque of rigid links and weight taken off by least squares."""
+    """Both joints of an arm along its own motion, less the torque of rigid links and weight: least squares beside dry
+    friction tell that."""
     units = {"force": "N m", "displacement": "rad", "velocity": "rad/s"}
     record = jfsm.read(
         data / "arm_two_joint" / "arm_154220.npz", force="tau_meas", displacement="pos_meas", velocity="vel_meas",
         units=units,
     ).resample(500.0)  # fmt: skip
-    torque, q, w = record.force, record.displacement, record.velocity
-    a = savgol_filter(w, 15, 2, deriv=1, delta=record.dt, axis=0)
+    torque, q, measured = record.force, record.displacement, record.velocity
+    w, a = (savgol_filter(measured, 61, 2, deriv=n, delta=record.dt, axis=0) for n in (0, 1))
     none, cos, sin = np.zeros(len(record)), np.cos(q[:, 1]), np.sin(q[:, 1])
     tip = q[:, 0] + q[:, 1]
     rigid = [  # inertia of both links, their coupling, inertia of the second and of its drive, weight of both
@@ -175,10 +176,12 @@ def arm(data: Path) -> Rig:
         (np.sin(q[:, 0]), none),
         (np.sin(tip), np.sin(tip)),
     ]
-    columns = np.stack([np.concatenate(pair) for pair in rigid], 1)
-    told = columns @ np.linalg.lstsq(columns, np.concatenate(torque.T), rcond=None)[0]
+    dry = [(np.sign(w[:, 0]), none), (none, np.sign(w[:, 1]))]
+    columns = np.stack([np.concatenate(pair) for pair in (*rigid, *dry)], 1)
+    numbers = np.linalg.lstsq(columns, np.concatenate(torque.T), rcond=None)[0]
+    told = columns[:, : len(rigid)] @ numbers[: len(rigid)]
     rest = torque - told.reshape(2, -1).T
-    left = jfsm.Record(record.time, force=rest, displacement=q, velocity=w, units=units, drive="motion")
+    left = jfsm.Record(record.time, force=rest, displacement=q, velocity=measured, units=units, drive="motion")
     joints = [jfsm.LinearDamping(0.01, at=at) for at in ((0, 1), (0, 2))]
     return Rig(left, jfsm.Structure([0.0, 0.0], joints).uncertain(damping=1.0))
 
@@ -195,13 +198,13 @@ def beam(data: Path) -> Rig:
 
 
 def f16(data: Path) -> Rig:
-    """The payload on the wing that carries it; the mean of the steady periods, a unit mass on the mount."""
+    """The wing's side of the payload's mount as the shaker moves it, believed to have one mode; the mean of the steady
+    periods."""
     loaded = np.load(data / "f16_gvt" / "f16_fullmsine_level1.npz")
-    wing, payload = (loaded["acc"][8192:, j].reshape(8, 8192).mean(0) for j in (1, 2))
-    units = {"base_acceleration": "m/s^2", "acceleration": "m/s^2"}
-    record = jfsm.Record(np.arange(8192) / 400.0, base_acceleration=wing, acceleration=payload, units=units)
-    omega = 2 * np.pi * 9.0
-    return Rig(record.resample(100.0), jfsm.Structure.sdof(1.0, omega**2, 0.04 * omega))
+    force, wing = (y[8192:].reshape(8, 8192).mean(0) for y in (loaded["force"], loaded["acc"][:, 1]))
+    record = jfsm.Record(np.arange(8192) / 400.0, force, acceleration=wing, units={"acceleration": "m/s^2"})
+    mass, omega = 185.0, 2 * np.pi * 7.32
+    return Rig(record.resample(100.0), jfsm.Structure.sdof(mass, mass * omega**2, 0.02 * mass * omega))
 
 
 RIGS: dict[str, Callable[[Path], Rig]] = {

@@ -119,6 +119,29 @@ def test_no_cause_is_named_beside_which_other_shapes_explain_most_of_what_it_lea
     assert decision.verdict == verdict
 
 
+@pytest.mark.parametrize(("left", "verdict"), [(8e-5, "cause"), (2e-4, "undecided")])
+def test_the_shape_of_a_trace_does_not_speak_against_a_name(left: float, verdict: str):
+    found = trial(9000.0, left, "coulomb")
+    decision = decide(GIVEN, REFITTED, [found], lambda t: None, lambda t: Unfit(100.0, 0.9), periods=100.0)
+    assert decision.verdict == verdict
+
+
+@pytest.mark.parametrize(("lasting", "verdict"), [(False, "consistent"), (True, "cause")])
+def test_small_errors_over_some_periods_make_no_model_consistent_that_is_wrong_in_the_long_run(lasting, verdict):
+    given, refitted, found = trial(0.0, 3e-4), trial(10.0, 3e-4), trial(9000.0, 3e-5, "bouc_wen")
+    decision = decide(given, refitted, [found], lambda t: None, lambda t: Unfit(0.0), periods=100.0, lasting=lasting)
+    assert decision.verdict == verdict
+
+
+@pytest.mark.parametrize(("left", "whole"), [(0.02, True), (5.0, False)])
+def test_a_map_of_the_whole_effect_stands_for_it_only_if_it_explains_that(left: float, whole: bool):
+    found, beside, alone = trial(9000.0, 0.04, "coulomb"), trial(-np.inf, 0.001), trial(-np.inf, left)
+    decision = decide(
+        GIVEN, REFITTED, [found], lambda t: beside if t.effects else alone, lambda t: Unfit(0.0), periods=100.0
+    )
+    assert decision.verdict == "unnamed" and decision.winner is (alone if whole else beside)
+
+
 @pytest.mark.parametrize(("nats", "verdict"), [(30.0, "consistent"), (50.0, "undecided")])
 def test_a_record_is_not_called_consistent_where_other_shapes_explain_more_than_noise(nats: float, verdict: str):
     given, refitted = trial(0.0, 0.0), trial(-5.0, 0.0)
@@ -126,17 +149,19 @@ def test_a_record_is_not_called_consistent_where_other_shapes_explain_more_than_
 
 
 @pytest.mark.parametrize(
-    ("path", "theta", "refit", "verdict"),
+    ("path", "width", "theta", "refit", "verdict"),
     [
-        ("stiffness@0-1.k", -3.9, 0.1, "undecided"),
-        ("stiffness@0-1.k", -3.8, 0.1, "cause"),
-        ("stiffness@0-1.k", -3.9, -3.9, "cause"),
-        ("damping@0-1.c", 3.9, 0.1, "undecided"),
-        ("damping@0-1.c", -3.9, 0.1, "cause"),
+        ("stiffness@0-1.k", 0.2, -3.9, 0.1, "undecided"),
+        ("stiffness@0-1.k", 0.2, -3.8, 0.1, "cause"),
+        ("stiffness@0-1.k", 0.2, -3.9, -3.9, "cause"),
+        ("stiffness@0-1.k", 0.7, -3.9, 0.1, "cause"),
+        ("stiffness@0-1.k", 0.7, 3.9, 0.1, "undecided"),
+        ("damping@0-1.c", 0.2, 3.9, 0.1, "undecided"),
+        ("damping@0-1.c", 0.2, -3.9, 0.1, "cause"),
     ],
 )
-def test_no_cause_is_named_beside_an_own_value_that_went_as_far_as_it_may(path, theta, refit, verdict):
-    own = Unknown(path, 0.0, 1.0, True, 0.0, 0.2, degrees=4.0, low=-3.9, high=3.9)
+def test_no_cause_is_named_beside_an_own_value_that_went_as_far_as_it_may(path, width, theta, refit, verdict):
+    own = Unknown(path, 0.0, 1.0, True, 0.0, width, degrees=4.0, low=-3.9, high=3.9)
     found, refitted = trial(9000.0, 0.0, "coulomb"), trial(1000.0, 0.1)
     for t, value in ((found, theta), (refitted, refit)):
         t.unknowns, t.theta = (own,), np.array([value])
@@ -389,6 +414,23 @@ def test_an_unlikely_cause_that_leaves_something_must_be_confirmed_by_held_out_r
     gain = Gain(before=0.1, refitted=0.1, after=0.08, floor=0.01, channels={}, interval=(low, 0.6))
     decision = Decision("cause", winner, {id(winner): probability}, {}, {})
     assert bool(_speaks_against(gain, decision)) != named
+
+
+@pytest.mark.parametrize(
+    ("verdict", "lasting", "after", "stands"),
+    [
+        ("unnamed", False, 0.2, True),
+        ("unnamed", False, 20.0, False),
+        ("cause", False, 0.7, True),
+        ("cause", True, 0.7, False),
+        ("cause", True, 0.2, True),
+    ],
+)
+def test_what_held_out_runs_speak_against_does_not_stand(verdict: str, lasting: bool, after: float, stands: bool):
+    winner = trial(9000.0, 0.002, "coulomb")
+    gain = Gain(before=1.0, refitted=1.0, after=after, floor=0.01 * after, channels={}, interval=(0.2, 0.6))
+    decision = Decision(verdict, winner, {id(winner): 0.9}, {}, {})
+    assert bool(_speaks_against(gain, decision, lasting=lasting)) != stands
 
 
 @pytest.mark.parametrize(

@@ -132,6 +132,12 @@ def test_the_most_particular_statement_of_trust_counts_in_whatever_order_it_came
     assert own_unknown(MODEL, "mass@1", trust).width == own_unknown(MODEL, "mass@1", {}).width
 
 
+def test_an_own_value_may_be_as_far_off_as_its_owner_says_it_may():
+    stated, vague = (own_unknown(MODEL, "mass@1", trust) for trust in ({}, {"mass": 1.0}))
+    assert stated.high == pytest.approx(np.log(5.0))
+    assert vague.high == -vague.low == pytest.approx(5 * np.log(2.0))
+
+
 def test_a_value_of_zero_cannot_be_refitted_as_a_share_of_itself():
     with pytest.raises(ValueError, match="damping@0-1.c is 0 and cannot be refitted as a share of itself; state a"):
         own_unknown(jfsm.Structure.sdof(1.0, 9.0), "damping@0-1.c", {})

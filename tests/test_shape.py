@@ -58,3 +58,14 @@ def test_a_force_of_both_follows_neither_by_itself():
 def test_a_force_that_remembers_is_no_matter_of_the_state():
     shape = seen(lambda x, v: np.tanh(3 * v), memory=4.0)
     assert shape.of_state < 0.4 and "remembers" in shape.words
+
+
+def test_along_a_steady_vibration_a_force_of_the_velocity_is_not_told_as_one_of_the_displacement():
+    rng = np.random.default_rng(3)
+    x, v = np.cos(np.pi / 0.4 * TIME), -np.sin(np.pi / 0.4 * TIME)  # forty samples a period
+    std = 0.05 * np.ones_like(TIME)
+    y = np.sign(v) * (1.0 + 0.1 * x**2) + std * rng.standard_normal(TIME.size)
+    x, v = (q + 0.003 * rng.standard_normal(TIME.size) for q in (x, v))
+    force_map = RKPM.fit(np.column_stack([x, v]), y, order=3, neighbours=160)
+    shape = shape_of(Residual((0, 1), x, v, y, std, force_map))
+    assert shape is not None and shape.of_state > 0.9 and "follows the velocity" in shape.words

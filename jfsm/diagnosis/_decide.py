@@ -83,6 +83,7 @@ def decide(
     *,
     imposed: bool = False,
     forgiven: bool = False,
+    lasting: bool = False,
     untold: Callable[[Trial], str] = lambda t: "",
     in_step: Callable[[Trial], bool] = lambda t: False,
 ) -> Decision:
@@ -91,8 +92,9 @@ def decide(
     `stand_in` adds to a trial the map of what it leaves; it is asked only where the winner leaves something.
     `lack_of_fit` tells what other laws would explain beside a trial's; it is asked of a cause that would be named.
     Where some force is `forgiven` to all none of them is right: laws of time would explain whatever is left, and a map
-    of the little that a law leaves does not speak against it. Along an `imposed` motion a map repeats even the small
-    faults of a law, one by one, as often as it repeats itself. What the motion leaves `untold`, and why, is a
+    of the little that a law leaves does not speak against it. Where the model is wrong in a `lasting` run, predictions
+    over some periods that leave little do not make it consistent. Along an `imposed` motion a map repeats even the
+    small faults of a law, one by one, as often as it repeats itself. What the motion leaves `untold`, and why, is a
     rival, and no finding. What is `in_step` with a drive, whose place it may take, is not even that where anything else
     leaves nothing but noise.
     """
@@ -101,7 +103,7 @@ def decide(
     stands = imposed and bool(winner.effects) and almost_all(winner, refitted)
     stands |= forgiven and bool(winner.effects) and explained(winner, refitted) >= NEARLY_ALL
     mapped = None if adequate(winner) or stands else stand_in(winner)
-    verdict = _verdict(given, refitted, winner, mapped)
+    verdict = _verdict(given, refitted, winner, mapped, lasting)
     if verdict == "cause" and not ranked.is_sure_of(winner):
         verdict = "undecided"
     if verdict == "cause":
@@ -109,8 +111,8 @@ def decide(
         def doubt_of(t: Trial) -> float:
             unfit = lack_of_fit(t)
             # Where none is right much of the rest has a shape, and says nothing against a law that explains nearly all;
-            # nor does a trace that no second effect would be named for.
-            shapeless = forgiven or explained(t, refitted) > 1.0 - WORTH_A_SECOND**2
+            # nor does a trace that no second effect would be named for, nor one that a whole run is to judge.
+            shapeless = forgiven or lasting or explained(t, refitted) > 1.0 - WORTH_A_SECOND**2
             return doubt(t, ranked.gained(t, winner), unfit._replace(share=0.0) if shapeless else unfit)
 
         winner, against = ranked.of_right_shape(winner, doubt_of)
@@ -241,11 +243,11 @@ def probabilities(trials: Sequence[Trial], periods: float) -> np.ndarray:
     return 0.995 * share / np.sum(share) + 0.005 / len(trials)
 
 
-def _verdict(given: Trial, refitted: Trial, winner: Trial, mapped: Trial | None) -> str:
-    clean = adequate(winner)
-    if winner.evidence - given.evidence < SIGNIFICANT and (clean or given.prediction.left < NEGLIGIBLE):
+def _verdict(given: Trial, refitted: Trial, winner: Trial, mapped: Trial | None, lasting: bool) -> str:
+    clean, slight = adequate(winner), given.prediction.left < NEGLIGIBLE and not lasting
+    if winner.evidence - given.evidence < SIGNIFICANT and (clean or slight):
         return "consistent"
-    if given.prediction.left < NEGLIGIBLE and not clean:
+    if slight and not clean:
         return "consistent"
     if clean:
         return "parameters" if winner is refitted else "cause" if winner.effects else "consistent"

@@ -114,28 +114,34 @@ def diagnose(
         assert not isinstance(studied, Trial)
     problem, every, found = studied
     steps.next("the verdict")
-    problem, found, decision = _decided(found, problem)
-    if clipped:
-        decision = beside_clipping(decision, clipped, found.refitted)
-    first, fitted, refitted = problem.first, problem.until[0], found.refitted
+
+    def concluded(*, lasting: bool = False):
+        judged, tried, decision = _decided(found, problem, lasting=lasting)
+        if clipped:
+            decision = beside_clipping(decision, clipped, tried.refitted)
+        confirmed = _confirmed(decision, tried.refitted, model, stated, held, judged.first, key, lasting=lasting)
+        return judged, tried, *confirmed
 
     steps.next("the gain on held-out readings")
-    decision, extended, gain, runs = _confirmed(decision, refitted, model, stated, held, first, key)
+    judged, tried, decision, extended, gain, runs = concluded()
+    if decision.verdict == "consistent" and gain is not None and _falls_out_of_step(gain):
+        judged, tried, decision, extended, gain, runs = concluded(lasting=True)
+    first, fitted, refitted = judged.first, judged.until[0], tried.refitted
     steps.next("the missing force")
     term = decision.named_term
     # Shown beside a law is the force that it stands for, with the own values that go with it.
     lacking = refitted.structure if term is None else decision.winner.structure.without(term)
     at = term.at if term is not None and term.at in lacking.links else None
     missing = residual(lacking, first, fitted, at)
-    silence = Silence(found.given, refitted, problem)
+    silence = Silence(tried.given, refitted, judged)
     steps.next("what would have been seen")
     if decision.verdict in ("consistent", "undecided"):  # silence is worth what would have been heard
         seen = naturally_detectable(every, silence)
     else:
-        seen = detectable(found.trials, silence)
-    tested = Tested(found.trials, found.behind, found.left_out, seen, found.lack.known)
-    leading = Leading.of(model, [refitted, *found.trials], decision.share, first, fitted)
-    return assemble(decision, clipped, refitted, tested, model, extended, problem.records, missing, gain, runs, leading)
+        seen = detectable(tried.trials, silence)
+    tested = Tested(tried.trials, tried.behind, tried.left_out, seen, tried.lack.known)
+    leading = Leading.of(model, [refitted, *tried.trials], decision.share, first, fitted)
+    return assemble(decision, clipped, refitted, tested, model, extended, judged.records, missing, gain, runs, leading)
 
 
 @dataclass(frozen=True)
@@ -231,15 +237,18 @@ class _Study:
         return _Searched(given, refitted, trials, behind, left_out, lack)
 
 
-def _decided(found: _Searched, problem: Problem) -> tuple[Problem, _Searched, Decision]:
-    """The verdict; where no cause is named, that of records of which a share of the force is forgiven to all."""
+def _decided(found: _Searched, problem: Problem, *, lasting: bool) -> tuple[Problem, _Searched, Decision]:
+    """The verdict; where no cause is named, that of records of which a share of the force is forgiven to all.
+
+    Where the model is wrong in a `lasting` run its predictions over some periods do not make it consistent.
+    """
     periods = sum(n.record.duration / n.period for n in problem.records)
 
     def decision_of(found: _Searched, problem: Problem, **how) -> Decision:
         mapped = partial(stand_in, problem=problem)
         return decide(found.given, found.refitted, found.trials, mapped, found.lack, periods, **how)
 
-    told = {"untold": untold(problem.records), "in_step": in_step(problem.records)}
+    told = {"untold": untold(problem.records), "in_step": in_step(problem.records), "lasting": lasting}
     decision = decision_of(found, problem, imposed=problem.imposed, **told)
     again = None if decision.winner.effects else forgiving(found.every, problem)
     if again is None:
@@ -248,7 +257,7 @@ def _decided(found: _Searched, problem: Problem) -> tuple[Problem, _Searched, De
     compared, best = {t.effects for t in trials}, min(t.rung for t in found.trials)
     dropped = [LeftBehind(t.effects, t.rung - best) for t in found.trials if t.effects not in compared]
     found = _Searched(given, refitted, trials, [*found.behind, *dropped], found.left_out, LackOfFit(problem))
-    return problem, found, decision_of(found, problem, forgiven=True)
+    return problem, found, decision_of(found, problem, forgiven=True, lasting=lasting)
 
 
 def _believed(
@@ -273,10 +282,13 @@ def _confirmed(
     held: Sequence[HeldOut],
     first: Nuisances,
     key: jax.Array,
+    *,
+    lasting: bool,
 ) -> tuple[Decision, Structure, Gain | None, list[dict]]:
     """The decision as held-out readings leave it, the structure to go on with, its gain, and the runs behind that.
 
-    The gain is that over the model as it was `stated`.
+    The gain is that over the model as it was `stated`; where the model is wrong in a `lasting` run alone, that run
+    decides.
     """
 
     def gained(extended: Structure) -> tuple[Gain | None, list[dict]]:
@@ -287,14 +299,19 @@ def _confirmed(
 
     extended = model if decision.verdict == "consistent" else decision.winner.extended()
     gain, runs = gained(extended)
-    if gain is not None and (against := _speaks_against(gain, decision)):
+    if gain is not None and (against := _speaks_against(gain, decision, lasting=lasting)):
         decision = decision.refused(against, refitted)
         extended = refitted.extended()
         gain, runs = gained(extended)
     return decision, extended, gain, runs
 
 
-def _speaks_against(gain: Gain, decision: Decision) -> str:
+def _falls_out_of_step(gain: Gain) -> bool:
+    """Whether the model as given, right over some periods, is wrong in the whole run over held-out readings."""
+    return gain.before > _WORSE * max(gain.floor, NEGLIGIBLE)
+
+
+def _speaks_against(gain: Gain, decision: Decision, *, lasting: bool = False) -> str:
     """Why runs on held-out readings speak against what was found, or nothing."""
     if decision.verdict in ("cause", "unnamed") and gain.after > _WORSE * max(gain.before, gain.floor):
         return "runs worse on held-out readings than the model as given"
@@ -304,7 +321,7 @@ def _speaks_against(gain: Gain, decision: Decision) -> str:
     unpredicted = decision.verdict == "cause" and decision.winner.laws and decision.kappa[id(decision.winner)] == 0.0
     if unpredicted and not (gain.closable and gain.significant):
         return "explains nothing that predictions leave, and is not confirmed by held-out readings"
-    if decision.verdict == "unnamed" and gain.closable and gain.closed < GATE:
+    if (decision.verdict == "unnamed" or lasting) and gain.closable and gain.closed < GATE:
         return "closes less than half of the error on held-out readings"
     return ""
 
