@@ -1,17 +1,13 @@
-"""Component tests, made up and measured: the motion is imposed, the force judged. Are the verdicts right?
+"""Component tests: the motion is imposed, the force judged. Are the verdicts right?
 
-    python benchmarks/component.py [made_up] [mr_damper] [--data DIR]
+    python benchmarks/component.py
 
-made_up: a spring and a dashpot with one hidden law or fault, or none, along three kinds of motion, made by NumPy and
-SciPy. mr_damper: the magneto-rheological damper of Vargas (2021) at its highest current, one record fitted and three
-others held out; no law of the catalogue is exactly true of it.
+A spring and a dashpot with one hidden law or fault, or none, along three kinds of motion, made by NumPy and SciPy.
 """
 
 import argparse
-import os
 from collections.abc import Callable
 from itertools import product
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import jax
@@ -106,7 +102,8 @@ def record_of(law: str, kind: str, noise: float, velocity: bool, seed: int) -> j
     return jfsm.Record(T, force=seen(force) + 0.2, drive="motion", **measured)
 
 
-def made_up() -> None:
+def main() -> None:
+    argparse.ArgumentParser(description="Verdicts on component tests that are made up.").parse_args()
     model = jfsm.Structure([0.0], [jfsm.LinearStiffness(K, at=(0, 1)), jfsm.LinearDamping(C, at=(0, 1))])
     tests = [*product(EVERY, ["tones"], [0.01], [False, True])]
     tests += product(EVERY[:10], ["steps", "sweep"], [0.001, 0.02], [False])
@@ -124,34 +121,7 @@ def made_up() -> None:
         channels = "x, v" if velocity else "x"
         print(f"{'' if exact else '!':1s} {law:18s} {kind:6s} {noise:6.1%} {channels:5s}", end=" ")
         print(f"{d.verdict:11s} {named:18s} {chance:5s} closed {d.gain.closed:.2f}  {rivals}", flush=True)
-    print(f"made_up: {right} of {len(tests)} exact, median share of the closable error closed {np.median(closed):.2f}")
-
-
-def mr_damper(data: Path) -> None:
-    loaded = np.load(data / "mr_damper" / "mr_series_B.npz")
-    units = {"displacement": "mm", "force": "N"}
-
-    def run(number: int) -> jfsm.Record:
-        x, force = (loaded[f"{name}_B_{number}"].astype(float).ravel() for name in ("x", "F"))
-        time = 0.01 * np.arange(x.size)
-        return jfsm.Record(time, force=force, displacement=x, units=units, drive="motion").since(1.0)
-
-    guess = [jfsm.LinearStiffness(5e3, at=(0, 1)), jfsm.LinearDamping(5e3, at=(0, 1))]
-    model = jfsm.Structure([0.0], guess).uncertain(stiffness=1.0, damping=1.0)
-    d = jfsm.diagnose(run(1), model, holdout=[run(3), run(5), run(10)], key=jax.random.key(0))
-    d.print()
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description="Verdicts on component tests, made up and measured.")
-    parser.add_argument("parts", nargs="*", default="all", choices=["all", "made_up", "mr_damper"])
-    default = Path(os.environ.get("JFSM_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
-    parser.add_argument("--data", type=Path, default=default)
-    given = parser.parse_args()
-    if "all" in given.parts or "made_up" in given.parts:
-        made_up()
-    if "all" in given.parts or "mr_damper" in given.parts:
-        mr_damper(given.data)
+    print(f"{right} of {len(tests)} exact, median share of the closable error closed {np.median(closed):.2f}")
 
 
 if __name__ == "__main__":
