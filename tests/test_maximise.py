@@ -7,7 +7,7 @@ import pytest
 
 from jfsm._result import Result
 from jfsm.identification import Unknown
-from jfsm.identification._maximise import _climb, _Place, _steps
+from jfsm.identification._maximise import Maximum, _climb, _Place, _steps, finish
 
 F = np.array([[4.0, 3.0, 0.5], [3.0, 5.0, -1.0], [0.5, -1.0, 2.0]])
 G = np.array([-10.0, 4.0, -6.0])
@@ -54,14 +54,16 @@ def test_no_logarithm_changes_by_more_than_one_in_a_step():
 class Valley:
     """Minus log-posterior with a narrow valley that bends: the sum of two exponentials is known well, little else."""
 
-    def __init__(self):
+    def __init__(self, much: float = 1.0):
+        self.much, self.asked = much, 0
         names = ("a.k", "b.k")
         self.hypothesis = SimpleNamespace(unknowns=(tuple(Unknown(n, 0.0, 1.0, True, 0.0, 1.0) for n in names),))
 
     def evaluate(self, theta, slack=0.0, most=None):
+        self.asked += 1
         a, b = theta[0]
-        residuals = np.array([1e3 * (np.exp(a) + np.exp(b) - 2.0), a + 1.5])
-        slopes = np.array([[1e3 * np.exp(a), 1e3 * np.exp(b)], [1.0, 0.0]])
+        residuals = np.array([1e3 * (np.exp(a) + np.exp(b) - 2.0), self.much * (a + 1.5)])
+        slopes = np.array([[1e3 * np.exp(a), 1e3 * np.exp(b)], [self.much, 0.0]])
         return np.array([0.5 * residuals @ residuals]), (slopes.T @ residuals)[None], (slopes.T @ slopes)[None]
 
 
@@ -70,3 +72,11 @@ def test_a_narrow_valley_that_bends_is_followed_to_its_end():
     found = _climb(valley, np.array([[0.5, np.log(2 - np.exp(0.5))]]), 0.0, 200, 1e-6)  # pyright: ignore[reportArgumentType]
     assert found.results[0] == Result.successful
     np.testing.assert_allclose(found.theta[0], [-1.5, np.log(2 - np.exp(-1.5))], atol=1e-3)
+
+
+@pytest.mark.parametrize(("best", "goes_on"), [(np.inf, True), (-1e6, False)])
+def test_a_climb_that_is_on_its_way_goes_on_unless_it_would_stay_far_behind(best: float, goes_on: bool):
+    valley, begin = Valley(much=30.0), np.array([[0.5, np.log(2 - np.exp(0.5))]])
+    found = finish(valley, Maximum(np.zeros(1), begin, np.zeros((1, 2, 2)), ()), best=best)  # pyright: ignore[reportArgumentType]
+    assert (abs(found.theta[0, 0] + 1.5) < 1e-3) == goes_on
+    assert (valley.asked > 40) == goes_on

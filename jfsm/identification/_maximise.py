@@ -21,6 +21,10 @@ _HOPELESS = 0.02
 """or less than this share of what the start is behind the best value known."""
 _PATIENCE = 4
 """Lanes that climb below a top that another has reached get so many times the steps that it took."""
+_ROUNDS = 8
+"""Most times that a climb gets its steps; in as many again it must promise to reach the best value known,"""
+_WORTH = 8.0
+"""or to gain so many nats."""
 _WALL = 1e-3
 """Damping of a step that is to come down from the wall of a valley, not to go along it."""
 _LONGEST = 1.0
@@ -68,10 +72,20 @@ def finish(posterior: Posterior, start: Maximum, steps: int = 25, best: float = 
     """Climb to the top with the true noise.
 
     `best` is the smallest minus log-posterior that any hypothesis reached: one that stays far above it need not be
-    exact.
+    exact. One that is still on its way, fast enough to come near it, gets as many steps again: a long valley that bends
+    takes short ones.
     """
     theta = _climb(posterior, start.theta, _LAST_RUNG, _RUNG_STEPS, _RUNG_ENOUGH).theta
-    return _climb(posterior, theta, 0.0, steps, _ENOUGH, best)
+    found = _climb(posterior, theta, 0.0, steps, _ENOUGH, best)
+    for _ in range(_ROUNDS - 1):
+        before = found.value
+        if not any(one is Result.maximum_steps for one in found.results):
+            break
+        best = min(best, float(np.min(before)))
+        found = _climb(posterior, found.theta, 0.0, steps, _ENOUGH, best)
+        if np.all(before - found.value < np.maximum(found.value - best, _WORTH) / _ROUNDS):
+            break
+    return found
 
 
 def settle(posterior: Posterior, theta: np.ndarray) -> Maximum:
