@@ -137,8 +137,8 @@ def mr_damper(data: Path) -> Rig:
     path, units = data / "mr_damper" / "mr_series_B.npz", {"displacement": "mm", "force": "N"}
 
     def run(number: int) -> jfsm.Record:
-        channels = {"displacement": f"x_B_{number}", "force": f"F_B_{number}"}
-        return jfsm.read(path, **channels, units=units, rate=100.0, drive="motion").since(1.0)
+        x, force = f"x_B_{number}", f"F_B_{number}"
+        return jfsm.read(path, displacement=x, force=force, units=units, rate=100.0, drive="motion").since(1.0)
 
     return Rig(run(1), device(5e3, 5e3), [run(3), run(5), run(10)])
 
@@ -157,33 +157,35 @@ def friction_damper(data: Path) -> Rig:
 
 
 def arm(data: Path) -> Rig:
-    """Both joints of an arm along its own motion, less the torque of rigid links and weight: least squares beside dry
-    friction tell that."""
+    """Both joints of an arm along its own motion, less the torque of rigid links and weight."""
     units = {"force": "N m", "displacement": "rad", "velocity": "rad/s"}
-    record = jfsm.read(
-        data / "arm_two_joint" / "arm_154220.npz", force="tau_meas", displacement="pos_meas", velocity="vel_meas",
-        units=units,
-    ).resample(500.0)  # fmt: skip
-    torque, q, measured = record.force, record.displacement, record.velocity
-    w, a = (savgol_filter(measured, 61, 2, deriv=n, delta=record.dt, axis=0) for n in (0, 1))
-    none, cos, sin = np.zeros(len(record)), np.cos(q[:, 1]), np.sin(q[:, 1])
-    tip = q[:, 0] + q[:, 1]
+    path = data / "arm_two_joint" / "arm_154220.npz"
+    record = jfsm.read(path, force="tau_meas", displacement="pos_meas", velocity="vel_meas", units=units)
+    record = record.resample(500.0)
+    torque, angle, speed = (np.asarray(y) for y in (record.force, record.displacement, record.velocity))
+    rest = torque - rigid_torque(torque, angle, speed, record.dt)
+    left = jfsm.Record(record.time, force=rest, displacement=angle, velocity=speed, units=units, drive="motion")
+    joints = [jfsm.LinearDamping(0.01, at=at) for at in ((0, 1), (0, 2))]
+    return Rig(left, jfsm.Structure([0.0, 0.0], joints).uncertain(damping=1.0))
+
+
+def rigid_torque(torque: np.ndarray, angle: np.ndarray, speed: np.ndarray, dt: float) -> np.ndarray:
+    """Torque (n, 2) of two rigid links and their weight, as least squares beside dry friction tell it."""
+    w, a = (savgol_filter(speed, 61, 2, deriv=order, delta=dt, axis=0) for order in (0, 1))
+    none, cos, sin = np.zeros(len(w)), np.cos(angle[:, 1]), np.sin(angle[:, 1])
+    tip = angle[:, 0] + angle[:, 1]
     rigid = [  # inertia of both links, their coupling, inertia of the second and of its drive, weight of both
         (a[:, 0], none),
         (cos * (2 * a[:, 0] + a[:, 1]) - sin * w[:, 1] * (2 * w[:, 0] + w[:, 1]), cos * a[:, 0] + sin * w[:, 0] ** 2),
-        (a.sum(1), a.sum(1)),
+        (a[:, 0] + a[:, 1], a[:, 0] + a[:, 1]),
         (none, a[:, 1]),
-        (np.sin(q[:, 0]), none),
+        (np.sin(angle[:, 0]), none),
         (np.sin(tip), np.sin(tip)),
     ]
     dry = [(np.sign(w[:, 0]), none), (none, np.sign(w[:, 1]))]
     columns = np.stack([np.concatenate(pair) for pair in (*rigid, *dry)], 1)
-    numbers = np.linalg.lstsq(columns, np.concatenate(torque.T), rcond=None)[0]
-    told = columns[:, : len(rigid)] @ numbers[: len(rigid)]
-    rest = torque - told.reshape(2, -1).T
-    left = jfsm.Record(record.time, force=rest, displacement=q, velocity=measured, units=units, drive="motion")
-    joints = [jfsm.LinearDamping(0.01, at=at) for at in ((0, 1), (0, 2))]
-    return Rig(left, jfsm.Structure([0.0, 0.0], joints).uncertain(damping=1.0))
+    numbers = np.linalg.lstsq(columns, np.concatenate([torque[:, 0], torque[:, 1]]), rcond=None)[0]
+    return (columns[:, : len(rigid)] @ numbers[: len(rigid)]).reshape(2, -1).T
 
 
 def beam(data: Path) -> Rig:
@@ -242,7 +244,7 @@ def judged(rig: Rig, folder: Path) -> dict:
     records = written(rig.record, folder / "records")
     known = records if rig.fitted_to is None else written(rig.fitted_to, folder / "fitted")
     command("fit", *known, "--model", rough, "--out", model)
-    held = [str(rig.held)] if isinstance(rig.held, float) else written(rig.held, folder / "held")
+    held = [str(rig.held)] if isinstance(rig.held, float | int) else written(rig.held, folder / "held")
     outputs = (
         "--report",
         page,

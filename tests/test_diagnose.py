@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jfsm
-from jfsm.diagnosis._candidates import Candidate, promising
+from jfsm.diagnosis._candidates import Candidate, as_promising, promising
 from jfsm.diagnosis._effect import Effect
 from jfsm.diagnosis._gain import Gain
 from jfsm.identification import _likelihood
@@ -375,6 +375,14 @@ def test_the_most_promising_laws_are_fitted_and_whatever_no_missing_force_tells_
     followed, left_out = promising([*laws, nowhere, *untold])
     assert followed == [*laws[4:], *untold]
     assert left_out == [*laws[:4], nowhere]
+
+
+def test_laws_that_explain_hardly_less_than_the_one_that_was_found_are_fitted_too():
+    known, start = jfsm.causes(), jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING)
+    laws = [Candidate((Effect(known["coulomb"], (0, j)),), (start,), 0.01 * j) for j in range(12)]
+    nowhere = Candidate((Effect(known["jenkins"], (0, 1)),), (), 0.1)
+    assert as_promising(laws[11].effects, laws, [*laws[:11], nowhere]) == laws[9:11]
+    assert as_promising((Effect(known["force_gain"], ("force", 1)),), laws, laws) == []
 
 
 def test_a_buckled_spring_that_leaves_one_well_is_another_law():

@@ -62,6 +62,8 @@ SHAPES = 2
 """Starts of a law."""
 _FOLLOWED = 8
 """Laws that are fitted, the most promising ones."""
+_HARDLY_LESS = 0.8
+"""Share of what a law explains of the missing force, from which another may be as likely: regression is not the fit."""
 _NOT_BESIDE_A_MOTION = (ForceGain, ChannelDelay, AccelerationBias, AccelerationGain, Preload, CoulombAsymmetric)
 """Effects that an imposed motion does not show: a gain of the force is that of all own values, a constant force its
 offset, asymmetric friction friction beside an offset, a late motion an early force, and what is wrong with an
@@ -152,6 +154,12 @@ def contained(laws: Sequence[AbstractTerm], among: Sequence[Candidate]) -> list[
     found = {(law.at, kind) for law in laws for kind in law.contains}
     alone = [c for c in among if c.starts and len(c.effects) == 1]
     return [c for c in alone if (c.effects[0].at, c.effects[0].cause.effect) in found]
+
+
+def as_promising(effects: tuple[Effect, ...], tried: Sequence[Candidate], left: Sequence[Candidate]) -> list[Candidate]:
+    """Candidates left out that explain hardly less of the missing force than the `effects` that were found."""
+    found = max((c.share for c in tried if c.effects == effects and c.share is not None), default=math.inf)
+    return [c for c in left if c.starts and c.share is not None and c.share >= _HARDLY_LESS * found]
 
 
 def may_rest_anywhere(structure: Structure, nuisances: Nuisances) -> bool:

@@ -14,7 +14,7 @@ from ..identification import Nuisances, prepare_all
 from ..records import Record
 from ..structures import Cause, Structure
 from ._adequacy import GATE, MUCH, NEGLIGIBLE, adequate, explained, white
-from ._candidates import Candidate, candidates, chosen_causes, contained, promising
+from ._candidates import Candidate, as_promising, candidates, chosen_causes, contained, promising
 from ._chance import beside_chance, noise_beyond, noise_levels
 from ._clipped import beside_clipping, limited
 from ._decide import Decision, decide
@@ -211,7 +211,9 @@ class _Study:
         tried, left_out = promising(every)
         found = search(tried, given, refitted, problem, self.tell)
         if settled(told([given, refitted, *found.trials])):
+            best = max(found.trials, key=lambda t: t.evidence)
             more = contained([law for t in close(found.trials) for law in t.laws], left_out)
+            more += [c for c in as_promising(best.effects, every, left_out) if c not in more]
         else:  # of a missing force that is ill seen regression may put the right law last
             more = [c for c in left_out if c.starts]
         if more:
