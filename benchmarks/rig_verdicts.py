@@ -171,7 +171,7 @@ def arm(data: Path) -> Rig:
 
 def rigid_torque(torque: np.ndarray, angle: np.ndarray, speed: np.ndarray, dt: float) -> np.ndarray:
     """Torque (n, 2) of two rigid links and their weight, as least squares beside dry friction tell it."""
-    w, a = (savgol_filter(speed, 61, 2, deriv=order, delta=dt, axis=0) for order in (0, 1))
+    w, a = (np.asarray(savgol_filter(speed, 61, 2, deriv=order, delta=dt, axis=0)) for order in (0, 1))
     none, cos, sin = np.zeros(len(w)), np.cos(angle[:, 1]), np.sin(angle[:, 1])
     tip = angle[:, 0] + angle[:, 1]
     rigid = [  # inertia of both links, their coupling, inertia of the second and of its drive, weight of both
