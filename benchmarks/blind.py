@@ -43,7 +43,7 @@ from tests.blind.drives import DRIVES  # noqa: E402
 from tests.blind.plants import Plant  # noqa: E402
 
 HOLDOUT = 0.3
-ROWS_PER_PROCESS = 40
+ROWS_PER_PROCESS = 15
 """After which a process makes room for a new one: the programs that it holds grow to gigabytes."""
 
 Drawing = dict[str, Any]
