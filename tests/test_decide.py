@@ -8,7 +8,7 @@ import pytest
 
 import jfsm
 from jfsm.diagnosis._clipped import beside_clipping
-from jfsm.diagnosis._decide import Decision, decide
+from jfsm.diagnosis._decide import Decision, decide, first_alone
 from jfsm.diagnosis._diagnose import _speaks_against
 from jfsm.diagnosis._effect import Effect
 from jfsm.diagnosis._enough import settled, something_left
@@ -124,6 +124,20 @@ def test_the_shape_of_a_trace_does_not_speak_against_a_name(left: float, verdict
     found = trial(9000.0, left, "coulomb")
     decision = decide(GIVEN, REFITTED, [found], lambda t: None, lambda t: Unfit(100.0, 0.9), periods=100.0)
     assert decision.verdict == verdict
+
+
+@pytest.mark.parametrize(("left", "verdict"), [(0.004, "cause"), (0.006, "undecided")])
+def test_where_a_second_effect_is_of_the_wrong_shape_the_first_is_named_if_it_explains_almost_all(left, verdict):
+    first, two = trial(9000.0, left, "coulomb"), trial(9500.0, 0.0005, "coulomb", "cubic_hardening")
+    tried, unfit = [first, two], {id(first): 100.0, id(two): 100.0}
+
+    def decided(trials):
+        return decide(GIVEN, REFITTED, trials, lambda t: None, lambda t: Unfit(unfit[id(t)]), periods=100.0)
+
+    assert decided(tried).verdict == "undecided"
+    decision = first_alone(decided(tried), tried, REFITTED, decided)
+    assert decision.verdict == verdict and decision.why[id(two)]
+    assert (decision.winner is first) == (verdict == "cause")
 
 
 @pytest.mark.parametrize(("lasting", "verdict"), [(False, "consistent"), (True, "cause")])

@@ -142,6 +142,23 @@ def decide(
     return Decision(verdict, winner, ranked.chance, ranked.kappa, ranked.why)
 
 
+def first_alone(
+    decision: Decision, tried: Sequence[Trial], refitted: Trial, decided: Callable[[Sequence[Trial]], Decision]
+) -> Decision:
+    """The decision, or that on single effects where two were likelier, and not of the right shape.
+
+    What the second one should be is open then, not the first, if that explains almost all. Nothing changes where a map
+    stands for both.
+    """
+    wrong = [t for t in tried if len(t.effects) > 1 and decision.why[id(t)] == _NOT_RIGHT]
+    if decision.verdict != "undecided" or not wrong:
+        return decision
+    alone = decided([t for t in tried if len(t.effects) == 1])
+    if alone.verdict != "cause" or not almost_all(alone.winner, refitted):
+        return decision
+    return replace(alone, kappa=decision.kappa | alone.kappa, why=decision.why | alone.why)
+
+
 class _Ranked:
     """Candidates, why each is not named, how much it explains, and how probable those are that may be."""
 

@@ -17,7 +17,7 @@ from ._adequacy import GATE, MUCH, NEGLIGIBLE, adequate, explained, white
 from ._candidates import Candidate, as_promising, candidates, chosen_causes, contained, promising
 from ._chance import beside_chance, noise_beyond, noise_levels
 from ._clipped import beside_clipping, limited
-from ._decide import Decision, decide
+from ._decide import Decision, decide, first_alone
 from ._detectable import Silence, detectable, naturally_detectable
 from ._diagnosis import Diagnosis
 from ._effect import Effect
@@ -248,7 +248,11 @@ def _decided(found: _Searched, problem: Problem, *, lasting: bool) -> tuple[Prob
 
     def decision_of(found: _Searched, problem: Problem, **how) -> Decision:
         mapped = partial(stand_in, problem=problem)
-        return decide(found.given, found.refitted, found.trials, mapped, found.lack, periods, **how)
+
+        def decided(trials: Sequence[Trial]) -> Decision:
+            return decide(found.given, found.refitted, trials, mapped, found.lack, periods, **how)
+
+        return first_alone(decided(found.trials), found.trials, found.refitted, decided)
 
     told = {"untold": untold(problem.records), "in_step": in_step(problem.records), "lasting": lasting}
     decision = decision_of(found, problem, imposed=problem.imposed, **told)
@@ -309,8 +313,8 @@ def _confirmed(
 
 
 def _falls_out_of_step(gain: Gain) -> bool:
-    """Whether the model as given, right over some periods, is wrong in the whole run over held-out readings."""
-    return gain.before > _WORSE * max(gain.floor, NEGLIGIBLE)
+    """Whether the model, right over some periods, is wrong in the whole run over held-out readings, refitted or not."""
+    return min(gain.before, gain.refitted) > _WORSE * max(gain.floor, NEGLIGIBLE)
 
 
 def _speaks_against(gain: Gain, decision: Decision, *, lasting: bool = False) -> str:
