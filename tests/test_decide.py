@@ -333,11 +333,20 @@ def test_a_load_that_may_stand_for_the_drive_yields_to_whatever_leaves_nothing(p
         assert decision.winner is drift and decision.share(load) == 0.0 and "noisy drive" in decision.why[id(load)]
 
 
-@pytest.mark.parametrize(("gained", "verdict"), [(21.0, "parameters"), (23.0, "cause")])
-def test_a_law_is_not_named_only_because_own_values_would_be_far_off_without_it(gained: float, verdict: str):
+@pytest.mark.parametrize(
+    ("strained", "gained", "verdict"),
+    [
+        ("without", 21.0, "parameters"),
+        ("without", 23.0, "cause"),
+        ("beside", 14.0, "parameters"),
+        ("beside", 16.0, "cause"),
+    ],
+)
+def test_a_law_is_not_named_only_because_own_values_are_far_off_without_it_or_beside_it(strained, gained, verdict):
     own = Unknown("stiffness@0-1.k", 0.0, 1.0, True, 0.0, 0.02, degrees=1.5, low=-3.9, high=3.9)
     refitted, found = trial(1000.0, 0.0), trial(1000.0 + gained, 0.0, "sine_stiffness")
-    refitted.unknowns, refitted.theta = (own,), np.array([0.33])  # six nats and a half
+    far = refitted if strained == "without" else found
+    far.unknowns, far.theta = (own,), np.array([0.33])  # six nats and a half
     found.laws, found.structure = (
         (jfsm.SineStiffness(1.0, 1.0, at=(0, 1)),),
         SimpleNamespace(stiffness_of=lambda at: 1.0),

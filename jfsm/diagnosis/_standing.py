@@ -50,8 +50,9 @@ def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
     # A gain error and own values that are all off by the same share predict the same readings: only what is believed
     # beforehand weighs them, so such a candidate need not beat the refit by a margin, nor leave less.
     same = not t.laws and adequate(t) and adequate(refitted)
-    # Of a law and a refit that both leave nothing the readings have to tell, not how far own values may be off.
-    spared = strain(refitted) - strain(t) if t.laws and adequate(t) and adequate(refitted) else 0.0
+    # Of a law and a refit that both leave nothing the readings have to tell, not how far own values may be off: a law
+    # may not win because it spares them, nor because it strains them more.
+    spared = max(strain(refitted) - strain(t), 0.0) if t.laws and adequate(t) and adequate(refitted) else 0.0
     better = t.evidence - (given.evidence if same else max(given.evidence, refitted.evidence + spared))
     if better <= SIGNIFICANT:
         return f"no more probable than the model {'as given' if same else 'refitted'}"
