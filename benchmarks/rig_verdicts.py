@@ -30,7 +30,10 @@ from scipy.signal import butter, savgol_filter, sosfiltfilt
 
 jax.config.update("jax_enable_x64", True)
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
 import jfsm  # noqa: E402  (after double precision is on)
+from benchmarks.rig_records import arm_two_joint, pendulum_large_angle  # noqa: E402  (needs the line above)
 
 COMMAND = (sys.executable, "-c", "from jfsm.cli import app; app()")
 
@@ -119,8 +122,7 @@ def silverbox_levels(data: Path) -> Rig:
 
 def pendulum(data: Path) -> Rig:
     """36 s fitted, the next 36 s held out; a unit inertia that is believed to swing as at small angles."""
-    path = data / "pendulum_large_angle" / "data31.csv"
-    record = jfsm.read(path, displacement="angle", units={"angle": "rad"}).resample(100.0)
+    record = pendulum_large_angle(data / "pendulum_large_angle").resample(100.0)
     begin = record.time[0]
     held = record.since(begin + 36.0).until(begin + 72.0)
     return Rig(record.until(begin + 36.0), jfsm.Structure.sdof(1.0, 6.0**2, 0.05), held)
@@ -158,10 +160,8 @@ def friction_damper(data: Path) -> Rig:
 
 def arm(data: Path) -> Rig:
     """Both joints of an arm along its own motion, less the torque of rigid links and weight."""
-    units = {"force": "N m", "displacement": "rad", "velocity": "rad/s"}
-    path = data / "arm_two_joint" / "arm_154220.npz"
-    record = jfsm.read(path, force="tau_meas", displacement="pos_meas", velocity="vel_meas", units=units)
-    record = record.resample(500.0)
+    record = arm_two_joint(data / "arm_two_joint").resample(500.0)
+    units = {kind: record.units[kind] for kind in ("force", "displacement", "velocity")}
     torque, angle, speed = (np.asarray(y) for y in (record.force, record.displacement, record.velocity))
     rest = torque - rigid_torque(torque, angle, speed, record.dt)
     left = jfsm.Record(record.time, force=rest, displacement=angle, velocity=speed, units=units, drive="motion")
