@@ -12,7 +12,7 @@ from .._types import require_x64
 from ..dynamics import Reconstruction
 from ..identification import Nuisances, prepare_all
 from ..records import Record
-from ..structures import Cause, Structure
+from ..structures import Cause, Clipping, Structure
 from ._adequacy import GATE, MUCH, NEGLIGIBLE, adequate, explained, white
 from ._candidates import Candidate, as_promising, candidates, chosen_causes, contained, promising
 from ._chance import beside_chance, noise_beyond, noise_levels
@@ -114,18 +114,8 @@ def diagnose(
         assert not isinstance(studied, Trial)
     problem, every, found = studied
     steps.next("the verdict")
-
-    def concluded(*, lasting: bool = False):
-        judged, tried, decision = _decided(found, problem, lasting=lasting)
-        if clipped:
-            decision = beside_clipping(decision, clipped, tried.refitted)
-        confirmed = _confirmed(decision, tried.refitted, model, stated, held, judged.first, key, lasting=lasting)
-        return judged, tried, *confirmed
-
     steps.next("the gain on held-out readings")
-    judged, tried, decision, extended, gain, runs = concluded()
-    if decision.verdict == "consistent" and gain is not None and _falls_out_of_step(gain):
-        judged, tried, decision, extended, gain, runs = concluded(lasting=True)
+    judged, tried, decision, extended, gain, runs = _concluded(found, problem, clipped, model, stated, held, key)
     first, fitted, refitted = judged.first, judged.until[0], tried.refitted
     steps.next("the missing force")
     term = decision.named_term
@@ -278,6 +268,33 @@ def _believed(
         problem = problem._replace(records=prepare_all(whole, model, reconstruction, weighed=refitted.structure))
         given, refitted = fit_model(problem, near=refitted)
     return problem, given, refitted
+
+
+def _concluded(
+    found: _Searched,
+    problem: Problem,
+    clipped: Sequence[Clipping],
+    model: Structure,
+    stated: Structure,
+    held: Sequence[HeldOut],
+    key: jax.Array,
+) -> tuple[Problem, _Searched, Decision, Structure, Gain | None, list[dict]]:
+    """The verdict as held-out readings leave it, what it rests on, and what `_confirmed` tells beside.
+
+    It is reached anew where predictions over some periods make the model consistent and the whole run does not.
+    """
+
+    def concluded(*, lasting: bool):
+        judged, tried, decision = _decided(found, problem, lasting=lasting)
+        if clipped:
+            decision = beside_clipping(decision, clipped, tried.refitted)
+        confirmed = _confirmed(decision, tried.refitted, model, stated, held, judged.first, key, lasting=lasting)
+        return judged, tried, *confirmed
+
+    reached = concluded(lasting=False)
+    _, _, decision, _, gain, _ = reached
+    out_of_step = decision.verdict == "consistent" and gain is not None and _falls_out_of_step(gain)
+    return concluded(lasting=True) if out_of_step else reached
 
 
 def _confirmed(
