@@ -103,7 +103,7 @@ def diagnose(
     stated = model
     for sensor in clipped:
         model = model + sensor
-    steps = _Steps(progress, 5)
+    steps = _Steps(progress, 4)
 
     steps.next("the model as given and refitted")
     study = _Study(model, chosen, places, reconstruction, key, steps.next, pairs=max_causes > 1)
@@ -113,8 +113,7 @@ def diagnose(
         studied = study.of(training, known=studied)
         assert not isinstance(studied, Trial)
     problem, every, found = studied
-    steps.next("the verdict")
-    steps.next("the gain on held-out readings")
+    steps.next("the verdict, and its gain on held-out readings")
     judged, tried, decision, extended, gain, runs = _concluded(found, problem, clipped, model, stated, held, key)
     first, fitted, refitted = judged.first, judged.until[0], tried.refitted
     steps.next("the missing force")
