@@ -71,14 +71,15 @@ def emps(data: Path) -> Rig:
 
 
 def roll_decay(data: Path) -> Rig:
-    """The simulation knows waves, no viscosity; a unit inertia."""
+    """The simulation, over the same minute, knows waves, no viscosity; a unit inertia."""
     folder = data / "roll_decay_kvlcc2"
     measured = jfsm.read(folder / "test_21338_0kn.npz", displacement="phi", units={"phi": "rad"})
     simulated = jfsm.read(folder / "simulation_fnpf_0kn.npz", displacement="phi", units={"phi": "rad"})
     omega = 2 * np.pi / 2.53
     lever = jfsm.CubicStiffness(0.5 * omega**2, at=(0, 1))
     believed = jfsm.Structure.sdof(1.0, omega**2, 0.005 * omega) + lever
-    return Rig(measured.since(8.3).until(72.3).resample(50.0), believed, 0.4, simulated)
+    measured, simulated = (record.since(8.3).until(72.3) for record in (measured, simulated))
+    return Rig(measured.resample(50.0), believed, 0.4, simulated)
 
 
 def springs(data: Path) -> Rig:

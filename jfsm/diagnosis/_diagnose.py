@@ -317,7 +317,7 @@ def _confirmed(
         if not held:
             return None, []
         noise = noise_levels(decision.winner, first)
-        return measure_gain(stated, refitted.extended(), extended, held, noise, first.omega, first.reconstruction, key)
+        return measure_gain(stated, refitted.extended(), extended, held, noise, first, key)
 
     extended = model if decision.verdict == "consistent" else decision.winner.extended()
     gain, runs = gained(extended)

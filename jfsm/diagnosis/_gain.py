@@ -1,20 +1,28 @@
-"""What mending the model is worth: free runs, or forces of an imposed motion, on readings that took no part."""
+"""What mending the model is worth: free runs, or forces of an imposed motion, on readings that took no part.
 
+A structure that nothing holds in place drifts: its runs are many short ones.
+"""
+
+import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import jax
 import numpy as np
 
 from ..dynamics import Reconstruction, simulate
+from ..identification import Nuisances
 from ..records import Record
 from ..structures import Structure
 from ._holdout import HeldOut
 
 _PERIODS = 2.0
 """Periods, at least, from which the state of a held-out run is estimated; they are not counted."""
+_RUN = 3.0
+"""Periods of every run of a structure that nothing holds in place: in a long one it drifts, however right the model."""
 _LEAD = 50.0
 """Periods, at most, that lead a structure that remembers to what was held out."""
 _END = 20
@@ -88,9 +96,16 @@ def _closable(before: float, floor: float) -> bool:
     return before > _CLOSABLE * floor
 
 
-def window_for(record: Record, omega: float) -> int:
-    """Samples from which the start of a held-out run is estimated."""
-    return min(max(50, math.ceil(_PERIODS * 2 * math.pi / (omega * record.dt))), len(record) // 3)
+def window_for(samples: int, period: float) -> int:
+    """Samples from which the start of a run of so many is estimated, where a period has `period` of them."""
+    return min(max(50, math.ceil(_PERIODS * period)), samples // 3)
+
+
+def how_run(fitted: Nuisances) -> list[str]:
+    """What is to be said of the runs behind a gain, where they are not those of whole records."""
+    if not fitted.drifts:
+        return []
+    return [f"Nothing holds the structure in place: it is run for {_RUN * fitted.period:.2g} s at a time."]
 
 
 def measure_gain(
@@ -99,13 +114,14 @@ def measure_gain(
     extended: Structure,
     held: Sequence[HeldOut],
     noise: Mapping[tuple, float],
-    omega: float,
-    reconstruction: Reconstruction,
+    fitted: Nuisances,
     key: jax.Array,
 ) -> tuple[Gain, list[dict]]:
     """Gain on what was held out, and per record the curves behind it (measured, before, after).
 
-    `noise` is the standard deviation of each channel's noise.
+    `noise` is the standard deviation of each channel's noise; `fitted` tells how long a period is, whether anything
+    holds the structure in place, and what the force does between its samples. Where nothing holds it many short runs
+    take the place of a long one.
     """
     seed = np.random.default_rng(np.asarray(jax.random.key_data(key)).astype(np.uint32).tolist())
     squares: dict[str, dict[tuple, list[float]]] = {
@@ -115,17 +131,21 @@ def measure_gain(
     pieces: list[np.ndarray] = []
     remembers = any(term.states or term.delay is not None for term in extended.terms)
     for part in held:
+        period = fitted.period / part.record.dt
         # What remembers shows at no instant: it is led to where a run begins, or would begin relaxed.
-        lead = math.ceil(_LEAD * 2 * math.pi / (omega * part.record.dt)) if remembers else 0
-        record, begin = part.led_by(lead)
-        window = window_for(record, omega)
-        counted = _counted(record, max(window, begin))
+        record, begin = part.led_by(math.ceil(_LEAD * period) if remembers else 0)
+        stretches = [slice(0, len(record))]
+        if fitted.drifts:
+            record, begin = part.record[part.begin :], 0
+            stretches = _stretches(record, period)
+        window = window_for(min(s.stop - s.start for s in stretches), period)
+        counted = _counted(record, stretches, window, begin)
+        run = partial(_run, stretches=stretches, window=window, reconstruction=fitted.reconstruction)
         runs = {
-            name: _run(model, record, window, reconstruction)
-            for name, model in (("before", given), ("refitted", refitted), ("after", extended))
+            name: run(model, record) for name, model in (("before", given), ("refitted", refitted), ("after", extended))
         }
-        left = _noise(extended, record, window, counted, reconstruction, runs["after"], noise, seed)
-        pieces += _blocks(record, [runs["before"], runs["after"]], counted, 2 * math.pi / (omega * record.dt))
+        left = _noise(partial(run, extended), record, counted, runs["after"], noise, seed)
+        pieces += _blocks(record, [runs["before"], runs["after"]], counted, period)
         for channel, y in record.answers.items():
             for name, run in runs.items():
                 squares[name].setdefault(channel, []).append(float(np.mean((run[channel][counted] - y[counted]) ** 2)))
@@ -149,7 +169,16 @@ def measure_gain(
     return Gain(**total, channels=channels, interval=interval), curves
 
 
-def _blocks(record: Record, runs: Sequence[Mapping[tuple, np.ndarray]], counted: slice, period: float) -> list:
+def _stretches(record: Record, period: float) -> list[slice]:
+    """Stretches of a record that are run one by one: some periods, after those from which the start is estimated."""
+    count = max(int(len(record) / ((_PERIODS + _RUN) * period)), 1)
+    ends = np.linspace(0, len(record), count + 1).astype(int).tolist()
+    return [slice(*pair) for pair in itertools.pairwise(ends)]
+
+
+def _blocks(
+    record: Record, runs: Sequence[Mapping[tuple, np.ndarray]], counted: np.ndarray, period: float
+) -> list[np.ndarray]:
     """Mean square errors (runs, channels) of contiguous blocks of the readings that are counted."""
     errors = np.stack([[(run[c] - y)[counted] ** 2 for c, y in record.answers.items()] for run in runs])
     count = int(np.clip(errors.shape[-1] / (_PERIODS * period), _FEWEST, _MOST_BLOCKS))
@@ -169,33 +198,42 @@ def _interval(blocks: np.ndarray, floor: float, rng: np.random.Generator) -> tup
     return float(low), float(high)
 
 
-def _run(model: Structure, record: Record, window: int, reconstruction: Reconstruction) -> dict[tuple, np.ndarray]:
-    response = simulate(model, record, window=window, reconstruction=reconstruction, solver="grid")
-    shown = response.readings(record)
-    # A run that escaped counts as one that stays at its last value: bad, and finite.
-    return {c: np.concatenate([y, np.full(len(record) - y.size, y[-1] if y.size else 0.0)]) for c, y in shown.items()}
+def _run(
+    model: Structure, record: Record, stretches: Sequence[slice], window: int, reconstruction: Reconstruction
+) -> dict[tuple, np.ndarray]:
+    """What a structure shows of a record, run over every stretch of it anew."""
+    shown: dict[tuple, list[np.ndarray]] = {}
+    for piece in (record[stretch] for stretch in stretches):
+        response = simulate(model, piece, window=window, reconstruction=reconstruction, solver="grid")
+        for c, y in response.readings(piece).items():
+            # A run that escaped counts as one that stays at its last value: bad, and finite.
+            last = y[-1] if y.size else 0.0
+            shown.setdefault(c, []).append(np.concatenate([y, np.full(len(piece) - y.size, last)]))
+    return {c: np.concatenate(pieces) for c, pieces in shown.items()}
 
 
 def _from(begin: int, run: Mapping[tuple, np.ndarray]) -> dict[tuple, np.ndarray]:
     return {channel: y[begin:] for channel, y in run.items()}
 
 
-def _counted(record: Record, begin: int) -> slice:
+def _counted(record: Record, stretches: Sequence[slice], window: int, begin: int) -> np.ndarray:
     """Samples on which a gain is measured; of an imposed motion not the last ones, where its rate is hardly known."""
-    return slice(begin, len(record) - len(record) // _END if record.drive == "motion" else None)
+    end = len(record) - len(record) // _END if record.drive == "motion" else len(record)
+    counted = np.concatenate([np.arange(stretch.start + window, stretch.stop) for stretch in stretches])
+    return counted[(counted >= begin) & (counted < end)]
 
 
 def _noise(
-    model, record: Record, window: int, counted: slice, reconstruction, run, levels: Mapping[tuple, float], rng
+    run: Callable[[Record], dict[tuple, np.ndarray]], record: Record, counted, shown, levels: Mapping[tuple, float], rng
 ) -> dict[tuple, float]:
     """Mean square error that noise alone leaves, per channel: its readings', its drive's and its start's."""
     total = {c: 0.0 for c in record.answers}
     for _ in range(_DRAWS):
         # The extended model's own run stands for the truth; fresh noise on what was measured, and all steps again.
-        truth = {c: run[c] if c in run else y for c, y in record.channels.items()}
-        again = _run(model, remeasured(record, truth, levels, rng), window, reconstruction)
+        truth = {c: shown[c] if c in shown else y for c, y in record.channels.items()}
+        again = run(remeasured(record, truth, levels, rng))
         for c in total:
-            total[c] += float(np.mean((again[c] - run[c])[counted] ** 2)) / _DRAWS
+            total[c] += float(np.mean((again[c] - shown[c])[counted] ** 2)) / _DRAWS
     return {c: total[c] + levels.get(c, 0.0) ** 2 for c in total}
 
 

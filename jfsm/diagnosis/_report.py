@@ -18,7 +18,7 @@ from ._decide import Decision
 from ._detectable import Smallest
 from ._diagnosis import CandidateResult, Diagnosis, Estimate, Finding, Rival
 from ._effect import Effect, names, places
-from ._gain import Gain
+from ._gain import Gain, how_run
 from ._next import RIVAL, Leading
 from ._residual import Residual, curves
 from ._search import LeftBehind
@@ -74,7 +74,7 @@ def assemble(
     refit = {
         p: _estimate(winner, p, model, units) for p in model.entries() if any(u.path == p for u in winner.unknowns)
     }
-    notes = tuple(dict.fromkeys(note for n in records for note in n.notes))
+    notes = tuple(dict.fromkeys([*(note for n in records for note in n.notes), *how_run(records[0])]))
     noise = {f"{kind} {j}": float(s) for n in records[:1] for (kind, j), s in zip(n.channels, n.floor, strict=True)}
     smallest = _detectable(tested.seen, units)
     shape = None if decision.verdict == "consistent" else shape_of(missing)

@@ -212,7 +212,7 @@ def windows(nuisances: Nuisances) -> tuple[np.ndarray, np.ndarray]:
 
 def extent(nuisances: Nuisances) -> np.ndarray:
     """Spread (channels,) of the readings; where a window is but a part of a slow motion, of those in a window."""
-    if nuisances.period * nuisances.omega >= 2 * np.pi * (1 - 1e-9):
+    if not nuisances.drifts:
         return nuisances.spread
     free = windows(nuisances)[1]
     values = np.asarray(nuisances.readings.values)[: nuisances.samples]

@@ -112,6 +112,11 @@ class Nuisances:
         """Whether a measured force or a moving base drives the record, so that masses show."""
         return isinstance(self.fine, Fine) and bool(self.fine.force.any() or self.fine.base.any())
 
+    @property
+    def drifts(self) -> bool:
+        """Whether nothing elastic holds the structure in place, and damping stops it sooner than it turns back."""
+        return self.period * self.omega < 2 * math.pi * (1 - _SAME)
+
     def weighs(self, structure: Structure) -> bool:
         """Whether the record tells masses: it is driven, or a motion is imposed whose inertia is more than noise."""
         if isinstance(self.fine, Fine):
