@@ -1,9 +1,15 @@
-"""The interval of a gain: how often it holds the share that is closed."""
+"""The interval of a gain, how often it holds the share that is closed, and the runs that a gain is that of."""
 
+import jax
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
 
-from jfsm.diagnosis._gain import _interval
+import jfsm
+from jfsm.diagnosis._gain import _interval, how_run, measure_gain
+from jfsm.diagnosis._holdout import HeldOut
+from jfsm.identification import prepare
 
 BEFORE, AFTER, FLOOR = 0.8, 0.2, 0.1
 
@@ -25,3 +31,42 @@ def test_a_gain_is_significant_where_there_is_one(after: float, rarely: bool):
     rng = np.random.default_rng(1)
     significant = np.mean([_interval(blocks(rng, after), FLOOR, rng)[0] > 0 for _ in range(200)])
     assert significant < 0.08 if rarely else significant > 0.8
+
+
+FRICTION, VISCOUS = 0.6, 0.5
+
+
+def pushed(spring: float, seconds: float = 30.0, rate: float = 50.0) -> jfsm.Record:
+    """A unit mass with friction, pushed to and fro, on a spring or on nothing that holds it."""
+    time = np.arange(0, seconds, 1 / rate)
+    rng = np.random.default_rng(5)
+    lines = 2 * np.pi * np.array([0.3, 0.5, 0.8, 1.1])
+    phases = rng.uniform(0, 2 * np.pi, lines.size)
+    force = np.sum(1.5 * np.cos(lines * time[:, None] + phases), 1)
+    drive = CubicSpline(time, force)
+
+    def rate_of(t: float, z: np.ndarray) -> list[float]:
+        return [z[1], float(drive(t)) - spring * z[0] - VISCOUS * z[1] - FRICTION * np.tanh(z[1] / 1e-2)]
+
+    path = solve_ivp(rate_of, (0, time[-1]), [0.0, 0.0], t_eval=time, rtol=1e-9, atol=1e-11, max_step=1 / rate)
+    return jfsm.Record(time, force, displacement=path.y[0] + 1e-5 * rng.standard_normal(time.size))
+
+
+@pytest.mark.parametrize(("spring", "in_parts"), [(0.0, True), (9.0, False)])
+def test_what_nothing_holds_in_place_is_run_for_some_periods_at_a_time(spring: float, in_parts: bool):
+    record = pushed(spring)
+    parts = [jfsm.LinearDamping(1.5, at=(0, 1)), *([jfsm.LinearStiffness(spring, at=(0, 1))] if spring else [])]
+    given = jfsm.Structure([1.0], parts)
+    nearly = given.with_values({"damping@0-1.c": VISCOUS}) + jfsm.SmoothCoulomb(0.95 * FRICTION, 1e-2, at=(0, 1))
+    fitted = prepare(record, given)
+    noise = {("displacement", 1): 1e-5}
+    gain, (curves,) = measure_gain(
+        given, given, nearly, [HeldOut(record, len(record) // 2)], noise, fitted, jax.random.key(0)
+    )
+    assert fitted.drifts is in_parts and bool(how_run(fitted)) is in_parts
+    assert gain.after < 0.2 * gain.before and gain.significant
+    assert len(curves["after"]["displacement", 1]) == len(curves["record"]) == len(record) // 2
+    whole = jfsm.simulate(nearly, record[len(record) // 2 :]).displacement[:, 0]
+    adrift = np.sqrt(np.mean((whole - record.displacement[len(record) // 2 :, 0]) ** 2))
+    # The same friction, five per cent too small, in one run of them all: only what a spring holds forgets that.
+    assert bool(adrift > 5 * gain.channels["displacement 1"].after) is in_parts
