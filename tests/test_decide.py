@@ -63,7 +63,8 @@ def test_a_cause_is_the_less_sure_the_more_other_shapes_would_gain_beside_it():
         return decide(GIVEN, REFITTED, [found], lambda t: None, lambda t: Unfit(nats), periods=100.0).share(found)
 
     sure = share(15.0)  # what noise may gain
-    assert sure > 0.95 and share(410.0) == pytest.approx(0.75 * sure, rel=1e-3) and share(801.0) == 0.0
+    assert sure > 0.95 and share(410.0) == pytest.approx(0.75 * sure, rel=1e-3)
+    assert share(801.0) == pytest.approx(0.5 * sure, rel=1e-3)
 
 
 @pytest.mark.parametrize(("other", "verdict"), [("cubic_hardening", "undecided"), ("smooth_coulomb", "cause")])
@@ -90,7 +91,7 @@ def test_no_cause_is_named_beside_which_other_shapes_would_explain_much(nats: fl
     decision = decide(GIVEN, REFITTED, [found], lambda t: None, lambda t: Unfit(nats), periods=100.0)
     assert decision.verdict == verdict
     if verdict == "undecided":
-        assert decision.winner is REFITTED and decision.share(found) == 0 and "shape" in decision.why[id(found)]
+        assert decision.winner is REFITTED and decision.share(found) < 0.5 and "shape" in decision.why[id(found)]
 
 
 @pytest.mark.parametrize(
@@ -281,9 +282,46 @@ def test_of_laws_alike_the_one_whose_shape_is_right_is_named(nats: float, named:
     lacking = [lack[t.effects[0].cause.id] for t in tried]
     decision = decide(GIVEN, REFITTED, tried, lambda t: None, lambda t: Unfit(lacking[tried.index(t)]), periods=50.0)
     assert decision.verdict == ("cause" if named else "undecided")
-    assert decision.share(tried[0]) == 0.0 and "shape" in decision.why[id(tried[0])]
+    assert "shape" in decision.why[id(tried[0])]
     if named:
+        assert decision.share(tried[0]) == 0.0
         assert decision.winner is tried[1] and 0.1 < decision.share(tried[1]) < 0.5 and not decision.why[id(tried[1])]
+
+
+@pytest.mark.parametrize(
+    ("left", "whiteness", "second", "mapped", "near"),
+    [
+        (0.002, 0.4, (), None, True),
+        (0.02, 0.4, (), None, False),
+        (0.002, 0.02, (), None, False),
+        (0.002, 0.4, ("preload",), None, False),
+        (0.002, 0.4, (), 0.01, True),
+    ],
+)
+def test_a_law_of_the_wrong_shape_that_leaves_little_is_named_by_its_class_where_nothing_else_stands(
+    left: float, whiteness: float, second: tuple[str, ...], mapped: float | None, near: bool
+):
+    found = trial(9000.0, left, "coulomb", *second)
+    found.whiteness = whiteness
+    maps = {id(REFITTED): None if mapped is None else trial(0.0, mapped)}
+    decision = decide(GIVEN, REFITTED, [found], lambda t: maps.get(id(t)), lambda t: Unfit(5000.0), periods=100.0)
+    assert decision.verdict == ("undecided" if mapped is None else "unnamed")
+    assert decision.near is (found if near else None) and (decision.share(found) > 0) == near
+    by_class = decision.by_class()
+    assert (by_class is not None) == (near and mapped is None)
+    assert by_class is None or (by_class.verdict == "cause" and by_class.winner is found)
+    if mapped is not None and near:  # what a held-out run says of the map leaves the law
+        refused = decision.refused("runs worse", REFITTED).by_class()
+        assert refused is not None and refused.winner is found
+
+
+@pytest.mark.parametrize(("strays", "named"), [((0.1, 0.1), 0), ((0.1, 0.05), 1)])
+def test_of_laws_alike_of_the_wrong_shape_the_one_is_near_whose_run_strays_least(strays, named: int):
+    tried = [trial(9000.0, 0.002, "quadratic_damping"), trial(8990.0, 0.0021, "cubic_damping")]
+    unfit = [Unfit(5000.0, strays=far) for far in strays]
+    decision = decide(GIVEN, REFITTED, tried, lambda t: None, lambda t: unfit[tried.index(t)], periods=50.0)
+    shares = [decision.share(t) for t in tried]
+    assert decision.near is tried[named] and shares[named] == max(shares) and 0.3 < sum(shares) < 0.5
 
 
 @pytest.mark.parametrize(("forgiven", "named"), [(False, "stiffness_drift"), (True, "coulomb")])

@@ -66,7 +66,8 @@ def test_what_nothing_holds_in_place_is_run_for_some_periods_at_a_time(spring: f
     assert fitted.drifts is in_parts and bool(how_run(fitted)) is in_parts
     assert gain.after < 0.2 * gain.before and gain.significant
     assert len(curves["after"]["displacement", 1]) == len(curves["record"]) == len(record) // 2
-    whole = jfsm.simulate(nearly, record[len(record) // 2 :]).displacement[:, 0]
-    adrift = np.sqrt(np.mean((whole - record.displacement[len(record) // 2 :, 0]) ** 2))
+    held = record[len(record) // 2 :]
+    whole = jfsm.simulate(nearly, held).displacement
+    adrift = np.sqrt(np.mean((whole - np.asarray(held.displacement)) ** 2))
     # The same friction, five per cent too small, in one run of them all: only what a spring holds forgets that.
     assert bool(adrift > 5 * gain.channels["displacement 1"].after) is in_parts

@@ -15,9 +15,11 @@ _OF_FAMILY = {
     "input": "an unmeasured force",
     "sensor": "a sensor's fault",
 }
+WIDER = {"stiffness": "nonlinear stiffness", "damping": "nonlinear damping"}
+"""What is said of a family's laws where none of its classes is likely by itself."""
 _GROWING = {
-    "displacement": {1: "hardening stiffness", -1: "softening stiffness", 0: "nonlinear stiffness"},
-    "velocity": {1: "damping that grows with speed", -1: "friction", 0: "nonlinear damping"},
+    "displacement": {1: "hardening stiffness", -1: "softening stiffness", 0: WIDER["stiffness"]},
+    "velocity": {1: "damping that grows with speed", -1: "friction", 0: WIDER["damping"]},
 }
 _EVEN = {"displacement": "asymmetric stiffness", "velocity": "asymmetric damping"}
 _BOTH = "damping that changes with displacement"

@@ -5,7 +5,9 @@ model leaves, and do so on every set of samples, held-out ones included. Where t
 evidence is trusted as it stands; where it does not, evidence counts no more than some tens of independent looks, and
 no cause is more probable than the share of the power that it explains. And no cause is named beside which laws of other
 shapes would gain more than a small share of what it gains itself, or explain half of what it leaves; up to there it is
-the less sure, by half at most. Nor is a record called consistent where they explain more than noise. And two laws of
+the less sure, by half at most. Of measured structures no law is exactly true: where what one of the wrong shape
+leaves is negligible, though not noise, it is near, and its class is right, if nothing else stands and runs on held-out
+readings confirm it. Nor is a record called consistent where they explain more than noise. And two laws of
 which predictions show nothing are not named: together they can be what one is that is not in the catalogue.
 """
 
@@ -25,6 +27,7 @@ from ._adequacy import (
     adequate,
     almost_all,
     explained,
+    practically_all,
     unexplained,
     white,
 )
@@ -36,6 +39,7 @@ from ._standing import special_case, why_not
 from ._trial import Trial
 
 _NOT_RIGHT = "explains much of it, but is not of the right shape"
+_NEAR = "is of the right class, though not quite of the right shape"
 _IN_STEP = "takes the place of a noisy drive, with which it is in step"
 _UNSEEN = "are two laws of which predictions show nothing, and may stand for one of another shape"
 _ALIKE = 0.3
@@ -49,13 +53,18 @@ all of 63 hidden effects were right that were given 0.7 to 0.9."""
 
 @dataclass(frozen=True)
 class Decision:
-    """Verdict and winning trial; probability of every alternative and reason for every candidate, in their order."""
+    """Verdict and winning trial; probability of every alternative and reason for every candidate, in their order.
+
+    The law that is `near` is of the right class at most: it is the cause where nothing else stands and runs on held-out
+    readings confirm it.
+    """
 
     verdict: str
     winner: Trial
     probability: dict[int, float]
     kappa: dict[int, float]
     why: dict[int, str]
+    near: Trial | None = None
 
     @property
     def named_term(self) -> AbstractTerm | None:
@@ -71,6 +80,12 @@ class Decision:
         probability = self.probability | {id(self.winner): 0.0}
         why_not = self.why | {id(self.winner): why}
         return replace(self, verdict="undecided", winner=instead, probability=probability, why=why_not)
+
+    def by_class(self) -> "Decision | None":
+        """The decision with the law that is near named, where there is one and nothing else stands."""
+        if self.verdict != "undecided" or self.near is None:
+            return None
+        return replace(self, verdict="cause", winner=self.near, why=self.why | {id(self.near): _NEAR})
 
 
 def decide(
@@ -99,7 +114,7 @@ def decide(
     leaves nothing but noise.
     """
     ranked = _Ranked(given, refitted, tried, periods, forgiven, in_step)
-    winner = ranked.best()
+    winner, near = ranked.best(), None
     stands = imposed and bool(winner.effects) and almost_all(winner, refitted)
     stands |= forgiven and bool(winner.effects) and explained(winner, refitted) >= NEARLY_ALL
     mapped = None if adequate(winner) or stands else stand_in(winner)
@@ -115,9 +130,11 @@ def decide(
             shapeless = forgiven or lasting or explained(t, refitted) > 1.0 - WORTH_A_SECOND**2
             return doubt(t, ranked.gained(t, winner), unfit._replace(share=0.0) if shapeless else unfit)
 
-        winner, against = ranked.of_right_shape(winner, doubt_of)
-        if against := untold(winner) or _unseen(winner, refitted) or against:
-            ranked.refuse(winner, against)
+        winner, wrong_shape = ranked.of_right_shape(winner, doubt_of)
+        against = untold(winner) or _unseen(winner, refitted)
+        near = ranked.nearest(winner, refitted, lack_of_fit) if wrong_shape and not against else None
+        if against or wrong_shape:
+            ranked.refuse(winner, against or wrong_shape, entirely=near is None)
             mapped = stand_in(refitted)
             stands_in = mapped is not None and explained(mapped, refitted) >= GATE
             verdict, winner = ("unnamed", refitted) if stands_in else ("undecided", winner)
@@ -139,7 +156,7 @@ def decide(
         ranked.kappa[id(winner)] = explained(winner, refitted)
     elif verdict == "undecided" and winner.effects:
         winner = refitted
-    return Decision(verdict, winner, ranked.chance, ranked.kappa, ranked.why)
+    return Decision(verdict, winner, ranked.chance, ranked.kappa, ranked.why, near)
 
 
 def first_alone(
@@ -227,13 +244,30 @@ class _Ranked:
         self.make_less_sure(self._family(found), much)
         return found, _NOT_RIGHT if much > 1.0 else ""
 
+    def nearest(self, winner: Trial, refitted: Trial, lack_of_fit: Callable[[Trial], Unfit]) -> Trial | None:
+        """The law of the winner's kind that is right in its class though not in its shape, or None.
+
+        Predictions over some periods hardly tell such laws apart; runs over all that was fitted do.
+        """
+        alike = [t for t in self._family(winner) if self.chance[id(t)] > _ALIKE * self.chance[id(winner)]]
+        kin = [t for t in alike if practically_all(t, refitted)]
+        if not kin or white(winner) or len(winner.effects) > 1:
+            return None
+        strays = np.array([max(lack_of_fit(t).strays, 1e-9) for t in kin])
+        chance = np.array([self.chance[id(t)] for t in kin])
+        told = chance * (np.min(strays) / strays) ** _LOOKS[0]
+        self.chance |= {id(t): float(p) for t, p in zip(kin, told * np.sum(chance) / np.sum(told), strict=True)}
+        return kin[int(np.argmax(told))]
+
     def make_less_sure(self, trials: Sequence[Trial], much: float) -> None:
         """By half at most."""
         for t in trials:
             self.chance[id(t)] *= 1.0 - 0.5 * min(much, 1.0)
 
-    def refuse(self, t: Trial, why: str) -> None:
-        self.why[id(t)], self.chance[id(t)] = why, 0.0
+    def refuse(self, t: Trial, why: str, *, entirely: bool = True) -> None:
+        self.why[id(t)] = why
+        if entirely:
+            self.chance[id(t)] = 0.0
 
     def _family(self, winner: Trial) -> list[Trial]:
         return [t for t in self.passing if families(t.effects) == families(winner.effects)]

@@ -13,7 +13,7 @@ from ..dynamics import Reconstruction
 from ..identification import Nuisances, prepare_all
 from ..records import Record
 from ..structures import Cause, Clipping, Structure
-from ._adequacy import GATE, MUCH, NEGLIGIBLE, adequate, explained, white
+from ._adequacy import ALMOST_ALL, GATE, MUCH, NEGLIGIBLE, adequate, explained, white
 from ._candidates import Candidate, as_promising, candidates, chosen_causes, contained, promising
 from ._chance import beside_chance, noise_beyond, noise_levels
 from ._clipped import beside_clipping, limited
@@ -325,6 +325,11 @@ def _confirmed(
         decision = decision.refused(against, refitted)
         extended = refitted.extended()
         gain, runs = gained(extended)
+    if gain is not None and (by_class := decision.by_class()) is not None:
+        near = by_class.winner.extended()
+        confirmed, runs_of_it = gained(near)
+        if confirmed is not None and confirmed.closed >= ALMOST_ALL:
+            return by_class, near, confirmed, runs_of_it
     return decision, extended, gain, runs
 
 

@@ -23,10 +23,12 @@ _FARTHEST = 4.0
 
 class Unfit(NamedTuple):
     """What other shapes would gain beside a hypothesis: nats beyond what noise lets them in the mean, and the share of
-    its innovations' power that they explain."""
+    its innovations' power that they explain; and how far its run over what was fitted strays, as a share of the signal.
+    """
 
     nats: float
     share: float = 0.0
+    strays: float = 0.0
 
 
 class LackOfFit:
@@ -56,14 +58,24 @@ def _unfit(trial: Trial, problem: Problem) -> Unfit:
         return Unfit(0.0)
     posterior = problem.posterior_of(trial)
     links = list(dict.fromkeys(law.at for law in trial.laws)) or list(trial.structure.links)
-    shapes = _shapes(trial, posterior, links)
-    if shapes is None:
-        return Unfit(0.0)
+    runs = [free_run(posterior, trial.theta, index) for index in range(len(posterior.records))]
+    if not all(np.all(np.isfinite(run)) for run in runs):
+        return Unfit(0.0, strays=np.inf)
+    shapes = _shapes(trial, posterior, links, runs)
     parts = [moved(trial, posterior, index, shape) for index, shape in enumerate(shapes)]
     error, by_unknown, by_shape = (np.concatenate(part) for part in zip(*parts, strict=True))
     (left, told), (less, more) = _left(by_unknown, error), _left(np.hstack([by_unknown, by_shape]), error)
     nats = (left - less) / 2 - (more - told) / 2  # half of chi-square, less half of its mean
-    return Unfit(nats, (left - less) / max(left, np.finfo(float).tiny))
+    return Unfit(nats, (left - less) / max(left, np.finfo(float).tiny), _strays(posterior, runs))
+
+
+def _strays(posterior: Posterior, runs: Sequence[np.ndarray]) -> float:
+    """Root mean square error of runs over what was fitted, in spreads of the channels."""
+    off = []
+    for nuisances, until, run in zip(posterior.records, posterior.until, runs, strict=True):
+        readings, use = (np.asarray(a)[:until] for a in (nuisances.readings.values, nuisances.readings.use))
+        off.append(((run[:until] - readings) / nuisances.spread)[use > 0])
+    return float(np.sqrt(np.mean(np.concatenate(off) ** 2)))
 
 
 def _left(columns: np.ndarray, wanted: np.ndarray) -> tuple[float, int]:
@@ -72,14 +84,13 @@ def _left(columns: np.ndarray, wanted: np.ndarray) -> tuple[float, int]:
     return float(np.sum(left**2)), told
 
 
-def _shapes(trial: Trial, posterior: Posterior, links: Sequence[tuple[int, int]]) -> list[np.ndarray] | None:
-    """Forces (shapes, n, dof) of unit size along the motion of every record; None where it runs away."""
+def _shapes(
+    trial: Trial, posterior: Posterior, links: Sequence[tuple[int, int]], runs: Sequence[np.ndarray]
+) -> list[np.ndarray]:
+    """Forces (shapes, n, dof) of unit size along the motion of every record, as a hypothesis runs over it."""
     rows = np.array([direction(link, trial.structure.dof) for link in links])
     motions = []
-    for index, nuisances in enumerate(posterior.records):
-        run = free_run(posterior, trial.theta, index)
-        if not np.all(np.isfinite(run)):
-            return None
+    for nuisances, run in zip(posterior.records, runs, strict=True):
         motion = missing_force(trial.structure, nuisances.showing(run), nuisances.samples)
         motions.append(np.stack([motion.displacement @ rows.T, motion.velocity @ rows.T]))  # (2, n, links)
     every = np.concatenate(motions, 1)

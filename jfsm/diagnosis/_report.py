@@ -11,7 +11,7 @@ from ..identification import Nuisances
 from ..structures import PARAMETER_CAUSES, Cause, Clipping, Structure, causes
 from ._adequacy import NEGLIGIBLE
 from ._candidates import Candidate
-from ._class import class_of
+from ._class import WIDER, class_of
 from ._clipped import finding
 from ._course import course
 from ._decide import Decision
@@ -199,7 +199,7 @@ def _finding(which: int, decision: Decision, trials: list[Trial], model: Structu
     def kind_of(t: Trial, which: int) -> str:
         return class_of(t.effects[which].cause, t.parts[which], peak, peak * nuisances.omega)
 
-    kind, probability, alike, instead = kind_of(winner, which), 0.0, 0.0, dict[Effect, float]()
+    kind, probability, alike, akin, instead = kind_of(winner, which), 0.0, 0.0, 0.0, dict[Effect, float]()
     for t in trials:
         rest = set(t.effects) - set(winner.effects)
         if effect in t.effects:
@@ -207,11 +207,14 @@ def _finding(which: int, decision: Decision, trials: list[Trial], model: Structu
         elif len(rest) == 1:
             rival = rest.pop()
             instead[rival] = instead.get(rival, 0.0) + decision.share(t)
-            if decision.share(t) > 0 and rival.at == effect.at and kind_of(t, t.effects.index(rival)) == kind:
-                alike += decision.share(t)
+            if decision.share(t) > 0 and rival.at == effect.at:
+                alike += decision.share(t) if kind_of(t, t.effects.index(rival)) == kind else 0.0
+                akin += decision.share(t) if rival.cause.family == effect.cause.family else 0.0
     ranked = sorted(instead.items(), key=lambda item: -item[1])
     rivals = tuple(Rival(r.cause.id, r.at, share) for r, share in ranked if share > RIVAL)
     cause, values = effect.cause, _values(winner, which, model, nuisances.record.units)
+    if probability + alike < 0.5 and akin > alike + RIVAL and cause.family in WIDER:
+        kind, alike = WIDER[cause.family], akin
     return Finding(
         cause.id, cause.family, effect.at, probability, values, rivals, cause.sentence, kind, probability + alike
     )
@@ -290,8 +293,10 @@ def _words(
         return f"The form of the model is right, its values are off: {what}.{share}", use
     if decision.verdict == "cause":
         known = dict(causes()) | {e.cause.id: e.cause for e in decision.winner.effects}
-        said = " ".join(_said(f, known) for f in findings)
-        return f"{said}{_remainder(decision.winner)}{share}", "Use the extended model." if pays else _NO_GAIN
+        said = " ".join(_said(f, known) for f in findings) + _remainder(decision.winner)
+        if decision.near is decision.winner:
+            said += " Its shape is not quite that of any law that was tried."
+        return f"{said}{share}", "Use the extended model." if pays else _NO_GAIN
     if decision.verdict == "unnamed":
         looks = "" if shape is None else f" {shape.words}"
         return (

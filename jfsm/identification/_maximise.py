@@ -83,7 +83,7 @@ def finish(posterior: Posterior, start: Maximum, steps: int = 25, best: float = 
             break
         best = min(best, float(np.min(before)))
         found = _climb(posterior, found.theta, 0.0, steps, _ENOUGH, best)
-        if np.all(before - found.value < np.maximum(found.value - best, _WORTH) / _ROUNDS):
+        if np.all(before < found.value + np.maximum(found.value - best, _WORTH) / _ROUNDS):
             break
     return found
 
