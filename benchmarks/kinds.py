@@ -47,7 +47,7 @@ LET_GO = ("cubic_hardening", "quintic_stiffness", "quadratic_damping", "coulomb"
 LASTING = ("cubic_hardening", "coulomb", "bouc_wen", "none")
 
 
-class UnfairError(ArithmeticError):
+class DrawAgainError(ArithmeticError):
     """What was drawn is no fair question."""
 
 
@@ -104,7 +104,7 @@ def double_well(seed: int, rng: np.random.Generator) -> Case:
         if crossings >= 12:
             break
     else:
-        raise UnfairError("the mass stays in its well")
+        raise DrawAgainError("the mass stays in its well")
     response = ("displacement", "acceleration", "velocity")[seed % 3]
     shown = {"force": drive(time), response: {"displacement": motion.x, "velocity": motion.v}.get(response, motion.a)}
     return case(rng, believed, law, motion, time, shown, {}, crossings=crossings)
@@ -180,7 +180,7 @@ def hidden(
             for _ in range(5):
                 motion = move(chain, law, pilot, start, force, base, scale)
                 if np.std(motion.x) > FARTHEST * scale:
-                    raise UnfairError("the motion grows")
+                    raise DrawAgainError("the motion grows")
                 if np.std(motion.x) < STUCK * scale:
                     law = law.scaled(0.3)
                     continue
@@ -188,9 +188,9 @@ def hidden(
                 if abs(np.log(found / wanted)) < 0.3 and left > LEAST_LEFT:
                     return law, move(chain, law, time, start, force, base, scale)
                 law = law.scaled(float(np.clip((wanted / found) ** 0.8, 0.3, 3.0)))
-        except UnfairError:
+        except DrawAgainError:
             continue
-    raise UnfairError(f"no fair {cause}")
+    raise DrawAgainError(f"no fair {cause}")
 
 
 def drawn_law(rng: np.random.Generator, cause: str, link: int, chain: Chain, plain: Motion) -> Law:

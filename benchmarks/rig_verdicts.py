@@ -58,8 +58,9 @@ def silverbox(data: Path) -> Rig:
 def bouc_wen(data: Path) -> Rig:
     """The mean of the steady periods."""
     loaded = np.load(data / "bouc_wen" / "boucwen_multisine.npz")
-    u, y = (loaded[name].ravel()[8192:].reshape(4, 8192).mean(0) for name in ("u_train", "y_train"))
-    return Rig(jfsm.Record(np.arange(8192) / 750.0, u, y), jfsm.Structure.sdof(2.0, 1e5, 10.0))
+    force, displacement = (loaded[name].ravel() for name in ("u_train", "y_train"))
+    record = jfsm.Record(np.arange(force.size) / 750.0, force, displacement)
+    return Rig(record.folded(8192, transient=1), jfsm.Structure.sdof(2.0, 1e5, 10.0))
 
 
 def emps(data: Path) -> Rig:
@@ -204,10 +205,11 @@ def f16(data: Path) -> Rig:
     """The wing's side of the payload's mount as the shaker moves it, believed to have one mode; the mean of the steady
     periods."""
     loaded = np.load(data / "f16_gvt" / "f16_fullmsine_level1.npz")
-    force, wing = (y[8192:].reshape(8, 8192).mean(0) for y in (loaded["force"], loaded["acc"][:, 1]))
-    record = jfsm.Record(np.arange(8192) / 400.0, force, acceleration=wing, units={"acceleration": "m/s^2"})
+    force, wing = loaded["force"], loaded["acc"][:, 1]
+    record = jfsm.Record(np.arange(force.size) / 400.0, force, acceleration=wing, units={"acceleration": "m/s^2"})
     mass, omega = 185.0, 2 * np.pi * 7.32
-    return Rig(record.resample(100.0), jfsm.Structure.sdof(mass, mass * omega**2, 0.02 * mass * omega))
+    steady = record.folded(8192, transient=1)
+    return Rig(steady.resample(100.0), jfsm.Structure.sdof(mass, mass * omega**2, 0.02 * mass * omega))
 
 
 RIGS: dict[str, Callable[[Path], Rig]] = {
