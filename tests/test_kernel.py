@@ -52,3 +52,25 @@ def test_other_errors_are_not_taken_for_a_refusal():
     with pytest.raises(RuntimeError, match="no such root"):
         root(jnp.array(-1.0))
     assert not _kernel._refused and root(jnp.array(4.0)) == 2.0
+
+
+def test_programs_are_compiled_once_and_those_not_used_for_long_are_dropped(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(_kernel, "_KEPT", 2)
+    compiled = []
+
+    @jit_with_kernels
+    def total(x, *, one_kernel):
+        compiled.append(x.size)
+        return jnp.sum(x)
+
+    for size in (1, 2, 1, 3, 1, 2):  # 2 has not been used for long when 3 comes
+        assert total(jnp.ones(size)) == size
+    assert compiled == [1, 2, 3, 2]
+
+
+def test_a_program_knows_what_it_was_compiled_for():
+    @jit_with_kernels
+    def powered(x, exponent, *, one_kernel):
+        return x**exponent
+
+    assert [float(powered(jnp.array(3.0), exponent)) for exponent in (2, 1, 2)] == [9.0, 3.0, 9.0]
