@@ -35,12 +35,13 @@ from ._doubt import UNFIT, doubt
 from ._effect import families
 from ._enough import WORTH_A_SECOND
 from ._lack_of_fit import Unfit
-from ._standing import special_case, why_not
+from ._standing import likelier_laws, special_case, why_not
 from ._trial import Trial
 
 _NOT_RIGHT = "explains much of it, but is not of the right shape"
 _NEAR = "is of the right class, though not quite of the right shape"
 _IN_STEP = "takes the place of a noisy drive, with which it is in step"
+_LIKELIER = "is likelier than a sensor's fault, but not than own values that are off by enough to be named"
 _UNSEEN = "are two laws of which predictions show nothing, and may stand for one of another shape"
 _ALIKE = 0.3
 """Probability of another law of its family, in those of a law that is not of the right shape, that may take its place.
@@ -188,7 +189,7 @@ class _Ranked:
         forgiven: bool,
         in_step: Callable[[Trial], bool],
     ):
-        self.tried = [given, refitted, *tried]
+        self.tried, self.refitted, self.periods = [given, refitted, *tried], refitted, periods
         self.kappa = {id(t): explained(t, refitted) for t in tried}
         told = [t for t in tried if not in_step(t)]
         self.why = {id(t): why_not(t, told, given, refitted) for t in tried}
@@ -200,8 +201,7 @@ class _Ranked:
                 self.why[id(t)] = self.why[id(t)] or (_IN_STEP if in_step(t) else "")
         self.passing = [t for t in tried if not self.why[id(t)]]
         self.alternatives = [given, refitted, *self.passing]
-        share = probabilities(self.alternatives, periods)
-        self.chance = {id(t): float(p) for t, p in zip(self.alternatives, share, strict=True)}
+        self.told, self.chance = told, self._shares(self.alternatives)
 
     def best(self) -> Trial:
         """The most probable; of a law and its special case that are about as probable, the latter."""
@@ -215,8 +215,14 @@ class _Ranked:
         self.why[id(winner)], self.why[id(special)] = "is hardly more probable than its special case", ""
         return special
 
+    def _shares(self, among: Sequence[Trial]) -> dict[int, float]:
+        return {id(t): float(p) for t, p in zip(among, probabilities(among, self.periods), strict=True)}
+
     def is_sure_of(self, winner: Trial) -> bool:
         """Whether a name, or at least its family, is probable enough to be said."""
+        if likelier := likelier_laws(winner, self.told, self.refitted):
+            self.chance = self._shares([*self.alternatives, *likelier])
+            self.why |= {id(t): _LIKELIER for t in likelier}
         family = sum(self.chance[id(t)] for t in self._family(winner))
         if not adequate(winner):
             # The rest may be the work of another law than the catalogue's: no name is surer than what it explains.

@@ -27,6 +27,17 @@ def why_not(t: Trial, tried: Sequence[Trial], given: Trial, refitted: Trial) -> 
     return _reason(t, given, refitted) or _needs_both(t, tried, refitted) or _has_a_bias(t, tried)
 
 
+def likelier_laws(winner: Trial, tried: Sequence[Trial], refitted: Trial) -> list[Trial]:
+    """Laws that are more probable than a sensor's fault, and that only want a margin to be named beside the refit.
+
+    The fault needs none, as it does what own values do that are all off by the same share.
+    """
+    if winner.laws or not winner.effects or not adequate(refitted):
+        return []
+    better = [t for t in tried if t.laws and t.evidence > winner.evidence]
+    return [t for t in better if adequate(t) and not _impossible(t, refitted)]
+
+
 def special_case(winner: Trial, passing: Sequence[Trial]) -> Trial | None:
     """The special case of the winner's law beside which its further numbers are not seen, if there is one."""
     if not winner.laws or len(winner.effects) > 1:
@@ -37,16 +48,23 @@ def special_case(winner: Trial, passing: Sequence[Trial]) -> Trial | None:
     return max(cases, key=lambda t: t.evidence, default=None)
 
 
-def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
-    """Why a candidate is no alternative, or nothing."""
-    over_refit, over_given = explained(t, refitted), explained(t, given)
-    if not math.isfinite(t.evidence) or over_refit == -math.inf:
+def _impossible(t: Trial, refitted: Trial) -> str:
+    """Why a candidate is none, whatever its evidence, or nothing."""
+    if not math.isfinite(t.evidence) or explained(t, refitted) == -math.inf:
         return "its motion runs away"
     for law in t.laws:
         if other := law.otherwise(t.structure.stiffness_of(law.at)):
             return other
     if far := far_off(t) - far_off(refitted):
         return f"takes {' and '.join(sorted(far))} as far from what the model states as they may be"
+    return ""
+
+
+def _reason(t: Trial, given: Trial, refitted: Trial) -> str:
+    """Why a candidate is no alternative, or nothing."""
+    if why := _impossible(t, refitted):
+        return why
+    over_refit, over_given = explained(t, refitted), explained(t, given)
     # A gain error and own values that are all off by the same share predict the same readings: only what is believed
     # beforehand weighs them, so such a candidate need not beat the refit by a margin, nor leave less.
     same = not t.laws and adequate(t) and adequate(refitted)
