@@ -34,7 +34,7 @@ def likelier_laws(winner: Trial, tried: Sequence[Trial], refitted: Trial) -> lis
     """
     if winner.laws or not winner.effects or not adequate(refitted):
         return []
-    better = [t for t in tried if t.laws and t.evidence > winner.evidence]
+    better = [t for t in tried if len(t.effects) == 1 and t.laws and t.evidence > winner.evidence]
     return [t for t in better if adequate(t) and not _impossible(t, refitted)]
 
 
