@@ -133,7 +133,7 @@ def decide(
 
         winner, wrong_shape = ranked.of_right_shape(winner, doubt_of)
         against = untold(winner) or _unseen(winner, refitted)
-        near = ranked.nearest(winner, refitted, lack_of_fit) if wrong_shape and not against else None
+        near = ranked.nearest(winner, lack_of_fit) if wrong_shape and not against else None
         if against or wrong_shape:
             ranked.refuse(winner, against or wrong_shape, entirely=near is None)
             mapped = stand_in(refitted)
@@ -250,13 +250,13 @@ class _Ranked:
         self.make_less_sure(self._family(found), much)
         return found, _NOT_RIGHT if much > 1.0 else ""
 
-    def nearest(self, winner: Trial, refitted: Trial, lack_of_fit: Callable[[Trial], Unfit]) -> Trial | None:
+    def nearest(self, winner: Trial, lack_of_fit: Callable[[Trial], Unfit]) -> Trial | None:
         """The law of the winner's kind that is right in its class though not in its shape, or None.
 
         Predictions over some periods hardly tell such laws apart; runs over all that was fitted do.
         """
         alike = [t for t in self._family(winner) if self.chance[id(t)] > _ALIKE * self.chance[id(winner)]]
-        kin = [t for t in alike if practically_all(t, refitted)]
+        kin = [t for t in alike if practically_all(t, self.refitted)]
         if not kin or white(winner) or len(winner.effects) > 1:
             return None
         strays = np.array([max(lack_of_fit(t).strays, 1e-9) for t in kin])

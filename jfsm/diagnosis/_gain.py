@@ -18,11 +18,8 @@ from ..identification import Nuisances
 from ..records import Record
 from ..structures import Structure
 from ._holdout import HeldOut
+from ._trial import FILTERED, PREDICTED
 
-_PERIODS = 2.0
-"""Periods, at least, from which the state of a held-out run is estimated; they are not counted."""
-_RUN = 3.0
-"""Periods of every run of a structure that nothing holds in place: in a long one it drifts, however right the model."""
 _LEAD = 50.0
 """Periods, at most, that lead a structure that remembers to what was held out."""
 _END = 20
@@ -31,8 +28,8 @@ _CLOSABLE = 1.05
 """Error before, in floors, from which there is anything to close."""
 _DRAWS = 4
 """Draws of noise that show what it leaves of a perfect model's run."""
-_FEWEST, _MOST_BLOCKS = 5, 20
-"""Blocks of held-out readings, two periods long where there are enough, that are drawn anew for an interval."""
+_BLOCK, _FEWEST, _MOST_BLOCKS = 2.0, 5, 20
+"""Periods in a block of held-out readings where there are enough, and how many are drawn anew for an interval."""
 _RESAMPLED = 1000
 
 
@@ -96,16 +93,16 @@ def _closable(before: float, floor: float) -> bool:
     return before > _CLOSABLE * floor
 
 
-def window_for(samples: int, period: float) -> int:
-    """Samples from which the start of a run of so many is estimated, where a period has `period` of them."""
-    return min(max(50, math.ceil(_PERIODS * period)), samples // 3)
+def _window(samples: int, period: float) -> int:
+    """Samples from which the start of a run of so many is estimated, which are not counted; a period has `period`."""
+    return min(max(50, math.ceil(FILTERED * period)), samples // 3)
 
 
 def how_run(fitted: Nuisances) -> list[str]:
     """What is to be said of the runs behind a gain, where they are not those of whole records."""
     if not fitted.drifts:
         return []
-    return [f"Nothing holds the structure in place: it is run for {_RUN * fitted.period:.2g} s at a time."]
+    return [f"Nothing holds the structure in place: it is run for {PREDICTED * fitted.period:.2g} s at a time."]
 
 
 def measure_gain(
@@ -133,18 +130,17 @@ def measure_gain(
     for part in held:
         period = fitted.period / part.record.dt
         # What remembers shows at no instant: it is led to where a run begins, or would begin relaxed.
-        record, begin = part.led_by(math.ceil(_LEAD * period) if remembers else 0)
-        stretches = [slice(0, len(record))]
-        if fitted.drifts:
-            record, begin = part.record[part.begin :], 0
-            stretches = _stretches(record, period)
-        window = window_for(min(s.stop - s.start for s in stretches), period)
+        lead = math.ceil(_LEAD * period) if remembers else 0
+        record, begin = (part.record[part.begin :], 0) if fitted.drifts else part.led_by(lead)
+        stretches = _stretches(record, period) if fitted.drifts else [slice(0, len(record))]
+        window = _window(min(s.stop - s.start for s in stretches), period)
         counted = _counted(record, stretches, window, begin)
-        run = partial(_run, stretches=stretches, window=window, reconstruction=fitted.reconstruction)
+        run_of = partial(_run, stretches=stretches, window=window, reconstruction=fitted.reconstruction)
         runs = {
-            name: run(model, record) for name, model in (("before", given), ("refitted", refitted), ("after", extended))
+            name: run_of(model, record)
+            for name, model in (("before", given), ("refitted", refitted), ("after", extended))
         }
-        left = _noise(partial(run, extended), record, counted, runs["after"], noise, seed)
+        left = _noise(partial(run_of, extended), record, counted, runs["after"], noise, seed)
         pieces += _blocks(record, [runs["before"], runs["after"]], counted, period)
         for channel, y in record.answers.items():
             for name, run in runs.items():
@@ -170,8 +166,9 @@ def measure_gain(
 
 
 def _stretches(record: Record, period: float) -> list[slice]:
-    """Stretches of a record that are run one by one: some periods, after those from which the start is estimated."""
-    count = max(int(len(record) / ((_PERIODS + _RUN) * period)), 1)
+    """Stretches of a record that are run one by one, as long as predictions are: in a longer one what nothing holds in
+    place drifts, however right the model."""
+    count = max(int(len(record) / ((FILTERED + PREDICTED) * period)), 1)
     ends = np.linspace(0, len(record), count + 1).astype(int).tolist()
     return [slice(*pair) for pair in itertools.pairwise(ends)]
 
@@ -181,7 +178,7 @@ def _blocks(
 ) -> list[np.ndarray]:
     """Mean square errors (runs, channels) of contiguous blocks of the readings that are counted."""
     errors = np.stack([[(run[c] - y)[counted] ** 2 for c, y in record.answers.items()] for run in runs])
-    count = int(np.clip(errors.shape[-1] / (_PERIODS * period), _FEWEST, _MOST_BLOCKS))
+    count = int(np.clip(errors.shape[-1] / (_BLOCK * period), _FEWEST, _MOST_BLOCKS))
     return [block.mean(-1) for block in np.array_split(errors, min(count, errors.shape[-1]), axis=-1)]
 
 

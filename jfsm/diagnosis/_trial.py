@@ -9,7 +9,7 @@ from ..identification import Hypothesis, Maximum, Nuisances, Posterior, Unknown,
 from ..structures import AbstractSensor, AbstractTerm, Structure
 from ._effect import Effect, names, places
 
-_FILTERED, _PREDICTED = 2.0, 3.0
+FILTERED, PREDICTED = 2.0, 3.0
 """Periods of filtering before, and of free prediction in, every window."""
 _LATE = 8
 """Samples at the end by which nothing is judged: what drives them a late force sensor shows after the record only."""
@@ -182,7 +182,7 @@ def predict(posterior: Posterior, theta: np.ndarray, slight: bool = False) -> Pr
                 noise = np.sum(np.where(mask, truth.variance, 0.0), 0) / count / size**2
                 white = np.minimum(np.asarray(nuisances.readings.variance) / size**2, noise)
                 # Readings err each by itself, a state that was filtered for a whole window: in two directions.
-                pieces = np.maximum(count * nuisances.record.dt / (nuisances.period * _PREDICTED), 1.0)
+                pieces = np.maximum(count * nuisances.record.dt / (nuisances.period * PREDICTED), 1.0)
                 expected.append(np.sum(noise))
                 scatter.append(np.sqrt(np.sum(2 * white**2 / count + (noise - white) ** 2 / pieces)))
         error = np.nan_to_num(np.array(errors), nan=np.inf)
@@ -203,9 +203,9 @@ def windows(nuisances: Nuisances) -> tuple[np.ndarray, np.ndarray]:
     if nuisances.path is not None:
         return np.zeros((nuisances.samples, len(nuisances.channels))), np.ones(nuisances.samples, bool)
     n, period = nuisances.samples, nuisances.period / nuisances.record.dt
-    period = min(period, n / (2 * (_FILTERED + _PREDICTED)))
-    phase = np.arange(n) % max(int(round((_FILTERED + _PREDICTED) * period)), 2)
-    free = (phase >= int(round(_FILTERED * period))) & (np.arange(n) < n - _LATE)
+    period = min(period, n / (2 * (FILTERED + PREDICTED)))
+    phase = np.arange(n) % max(int(round((FILTERED + PREDICTED) * period)), 2)
+    free = (phase >= int(round(FILTERED * period))) & (np.arange(n) < n - _LATE)
     channels = len(nuisances.channels)
     return np.repeat((~free)[:, None], channels, 1).astype(float), free
 
