@@ -61,7 +61,13 @@ def test_what_nothing_holds_in_place_is_run_for_some_periods_at_a_time(spring: f
     fitted = prepare(record, given)
     noise = {("displacement", 1): 1e-5}
     gain, (curves,) = measure_gain(
-        given, given, nearly, [HeldOut(record, len(record) // 2)], noise, fitted, jax.random.key(0)
+        given,
+        lambda of: given,
+        lambda of: nearly,
+        [HeldOut(record, len(record) // 2)],
+        noise,
+        fitted,
+        jax.random.key(0),
     )
     assert fitted.drifts is in_parts and bool(how_run(fitted)) is in_parts
     assert gain.after < 0.2 * gain.before and gain.significant

@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import Enum
 from itertools import chain, product, zip_longest
 
 import equinox as eqx
@@ -68,6 +69,14 @@ _NOT_BESIDE_A_MOTION = (ForceGain, ChannelDelay, AccelerationBias, AccelerationG
 """Effects that an imposed motion does not show: a gain of the force is that of all own values, a constant force its
 offset, asymmetric friction friction beside an offset, a late motion an early force, and what is wrong with an
 accelerometer shows beside the displacement."""
+
+
+class Apart(Enum):
+    """What each of several records has to itself, beside what is never shared: nothing, own values, or all numbers."""
+
+    nothing = 0
+    own = 1
+    all = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,11 +309,17 @@ def hypothesis(
     *,
     refit: bool = True,
     begins: Sequence[Begin | None] = (),
+    apart: Apart = Apart.nothing,
 ) -> Hypothesis:
     """Starts with their unknowns: the model's own values, the effect's numbers, and each record's nuisances.
 
-    `begins` holds where each start begins otherwise, if it is not as given.
+    `begins` holds where each start begins otherwise, if it is not as given. Every record has to itself what is `apart`.
     """
+
+    def of_each(u: Unknown, own: bool) -> list[Unknown]:
+        alone = apart is Apart.all or (own and apart is Apart.own)
+        return [replace(u, record=index) for index in range(len(records))] if alone else [u]
+
     structures, unknowns = [], []
     trust = dict(model.trust)
     given = set(model.entries())
@@ -313,8 +328,8 @@ def hypothesis(
         effect = [p for p, (what, _) in start.entries().items() if p not in given and what.free]
         structure = with_offsets(start, records)
         degrees = DEGREES_BESIDE if effect else DEGREES
-        mine: list[Unknown] = [begun(own_unknown(structure, p, trust, degrees), begin) for p in own]
-        mine += [effect_unknown(structure, p, records[0]) for p in effect]
+        mine = [begun(u, begin) for p in own for u in of_each(own_unknown(structure, p, trust, degrees), own=True)]
+        mine += [u for p in effect for u in of_each(effect_unknown(structure, p, records[0]), own=False)]
         for index, nuisances in enumerate(records):
             mine += [begun(u, begin) for u in nuisance_unknowns(structure, nuisances, index)]
         structures.append(structure)

@@ -26,7 +26,7 @@ _DRAWS = 6
 
 def beside_chance(trials: Sequence[Trial], problem: Problem, key: jax.Array) -> list[Trial]:
     """The trials; the most probable, if its innovations are white and yet it leaves something, with draws of noise."""
-    model, records, _ = problem
+    model, records = problem.model, problem.records
     best = max(trials, key=lambda t: t.evidence)
     limits = any(isinstance(sensor, Clipping) for sensor in model.sensors)
     if adequate(best) or not white(best) or limits or problem.imposed:

@@ -76,6 +76,11 @@ class Decision:
         """Probability of a trial; 0 for one that is no alternative."""
         return self.probability.get(id(trial), 0.0)
 
+    def open(self) -> "Decision":
+        """The decision half as sure of every cause."""
+        shares = {which: p / 2 if which in self.kappa else p for which, p in self.probability.items()}
+        return replace(self, probability=shares)
+
     def refused(self, why: str, instead: Trial) -> "Decision":
         """The decision without its winner, which something else speaks against."""
         probability = self.probability | {id(self.winner): 0.0}

@@ -28,7 +28,7 @@ from .._threads import compiled_once, side_by_side
 from ..identification import Posterior, prior
 from ..structures import Preload, Structure
 from ._adequacy import NOTICEABLE, SIGNIFICANT
-from ._candidates import Candidate, modest
+from ._candidates import Candidate, modest, own_paths
 from ._effect import Effect
 from ._problem import Problem
 from ._standing import UNPREDICTED
@@ -109,7 +109,9 @@ class _Seen:
         self.effects, self.posterior, self.silence = effects, posterior, silence
         self.unknowns, self.program = posterior.hypothesis.unknowns[0], posterior.program
         own, entries = silence.problem.model.entries(), posterior.hypothesis.structures[0].entries()
-        self.mine = [k for k, u in enumerate(self.unknowns) if u.record is None and u.path not in own]
+        self.own = own_paths(silence.problem.model, silence.problem.records)
+        mine = {path for path in entries if path not in own and not path.startswith("offset@")}
+        self.mine = [k for k, u in enumerate(self.unknowns) if u.path in mine]
         self.path = self.unknowns[self.mine[0]].path
         part = self.path.split(".")[0] + "."
         self.paths = [p for p in entries if p.startswith(part) and p not in own]
@@ -157,7 +159,7 @@ class _Seen:
         believed, mine, grows = prior(self.unknowns, theta)[2], self.mine, self.grows
         width, center = (np.array([getattr(self.unknowns[k], name) for k in mine]) for name in ("width", "center"))
         free = [k for k in range(theta.size) if k not in mine]
-        nuisances = [k for k in free if self.unknowns[k].record is not None]
+        nuisances = [k for k in free if self.unknowns[k].path not in self.own]
         beside_refit, beside_given = (_told(information, believed, mine, others) for others in (free, nuisances))
         scaled = np.maximum(np.linalg.eigvalsh(width[:, None] * beside_refit * width), 0.0)
 

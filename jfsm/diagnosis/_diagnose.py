@@ -2,39 +2,36 @@
 
 import secrets
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import jax
-import numpy as np
 
 from .._types import require_x64
 from ..dynamics import Reconstruction
-from ..identification import Nuisances, prepare_all
+from ..identification import Nuisances
 from ..records import Record
 from ..structures import Cause, Clipping, Structure
-from ._adequacy import ALMOST_ALL, GATE, MUCH, NEGLIGIBLE, adequate, explained, white
-from ._candidates import Candidate, as_promising, candidates, chosen_causes, contained, promising
-from ._chance import beside_chance, noise_beyond, noise_levels
+from ._adequacy import ALMOST_ALL, GATE, NEGLIGIBLE, adequate
+from ._between import differences
+from ._candidates import chosen_causes
+from ._chance import noise_levels
 from ._clipped import beside_clipping, limited
 from ._decide import Decision, decide, first_alone
 from ._detectable import Silence, detectable, naturally_detectable
 from ._diagnosis import Diagnosis
-from ._effect import Effect
-from ._enough import hidden, settled, something_left
 from ._forgiving import forgiving
-from ._gain import Gain, measure_gain
+from ._gain import Gain, StructureOf, measure_gain
 from ._holdout import HeldOut, split
 from ._lack_of_fit import LackOfFit
 from ._next import Leading
 from ._problem import Problem
 from ._report import Tested, assemble
 from ._residual import residual, stand_in
-from ._search import LeftBehind, best_of_each, fit_model, refit_from, search, search_akin, search_known, search_pairs
+from ._search import LeftBehind
+from ._study import Searched, Study
 from ._trial import Trial
 from ._untold import in_step, untold
 
-_HEAVIER = 0.03
 _WORSE = 1.5
 """Error on held-out readings, in errors of the model as given and in those that noise leaves, from which a cause makes
 the model worse."""
@@ -106,7 +103,7 @@ def diagnose(
     steps = _Steps(progress, 4)
 
     steps.next("the model as given and refitted")
-    study = _Study(model, chosen, places, reconstruction, key, steps.next, pairs=max_causes > 1)
+    study = Study(model, chosen, places, reconstruction, key, steps.next, pairs=max_causes > 1)
     studied = study.of(training, unless_later=isinstance(holdout, float))
     if isinstance(studied, Trial):  # as much is kept back of the first part
         training, held = split(record, holdout, first=True)
@@ -130,118 +127,26 @@ def diagnose(
         seen = detectable(tried.trials, silence)
     tested = Tested(tried.trials, tried.behind, tried.left_out, seen, tried.lack.known)
     leading = Leading.of(model, [refitted, *tried.trials], decision.share, first, fitted)
-    return assemble(decision, clipped, refitted, tested, model, extended, judged.records, missing, gain, runs, leading)
+    return assemble(decision, clipped, refitted, tested, judged, extended, missing, gain, runs, leading)
 
 
-@dataclass(frozen=True)
-class _Searched:
-    """Every trial, the candidates that were not pursued to their tops, and those that were not tried."""
-
-    given: Trial
-    refitted: Trial
-    trials: list[Trial]
-    behind: list[LeftBehind]
-    left_out: list[Candidate]
-    lack: LackOfFit
-
-    @property
-    def every(self) -> list[Trial]:
-        return [self.given, self.refitted, *self.trials]
-
-
-@dataclass(frozen=True)
-class _Study:
-    """How records are looked into."""
-
-    model: Structure
-    chosen: dict[str, Cause]
-    places: Sequence[tuple[int, int]] | None
-    reconstruction: Reconstruction
-    key: jax.Array
-    tell: Callable[[str, int], None]
-    pairs: bool
-
-    def of(
-        self, training: Sequence[tuple[Record, int]], *, unless_later: bool = False, known: Trial | None = None
-    ) -> tuple[Problem, list[Candidate], _Searched] | Trial:
-        """What is fitted to, what could be tried, what was found.
-
-        Where what is lacking shows in what was kept back, which then has to be fitted, the best single trial beside
-        which it does, `unless_later`; that is `known` then.
-        """
-        problem, given, refitted = _believed(training, self.model, self.reconstruction)
-        if unless_later and _later(refitted, NEGLIGIBLE):
-            return refitted
-        every = candidates(self.model, problem.records, self.chosen, self.places)
-        found = self._searched(every, given, refitted, known, problem)
-        best = max(found.every, key=lambda t: t.evidence)
-        if unless_later and _later(best, MUCH):
-            return max((t for t in found.every if len(t.effects) < 2), key=lambda t: t.evidence)
-        return problem, every, found
-
-    def _searched(
-        self,
-        every: list[Candidate],
-        given: Trial,
-        refitted: Trial,
-        known: Trial | None,
-        problem: Problem,
-    ) -> _Searched:
-        """Single effects fitted, the promising ones first, and pairs of them where that leaves something."""
-        stands_for_the_drive = in_step(problem.records)
-
-        def told(trials: Sequence[Trial]) -> list[Trial]:
-            return [t for t in trials if not stands_for_the_drive(t)]
-
-        def close(trials: Sequence[Trial]) -> list[Trial]:
-            best = max(told([given, refitted, *trials]), key=lambda t: t.evidence)
-            return [t for t in trials if t is best or explained(t, refitted) >= GATE]
-
-        tried, left_out = promising(every)
-        found = search(tried, given, refitted, problem, self.tell)
-        if settled(told([given, refitted, *found.trials])):
-            best = max(found.trials, key=lambda t: t.evidence)
-            more = contained([law for t in close(found.trials) for law in t.laws], left_out)
-            more += [c for c in as_promising(best.effects, every, left_out) if c not in more]
-        else:  # of a missing force that is ill seen regression may put the right law last
-            more = [c for c in left_out if c.starts]
-        if more:
-            found = found.and_then(search(more, given, refitted, problem, self.tell))
-            left_out = [c for c in left_out if c not in more]
-        found = search_akin(close(found.trials), every, found, problem, self.tell)
-        if known is not None and known.effects:
-            found = search_known(known, found, problem, self.tell)
-        refitted = refit_from(found.trials, refitted, problem)
-        trials, behind = [t.beside(refitted) for t in found.trials], found.behind
-        louder = noise_beyond([given, refitted, *trials], problem)
-        trials = [t.amid(louder) for t in (given, refitted, *trials)]
-        given, refitted, *trials = beside_chance(trials, problem, self.key)
-        lack, alone = LackOfFit(problem), told([given, refitted, *trials])
-        effects = _beside(alone, refitted, every, lack, imposed=problem.imposed) if self.pairs else []
-        if effects:
-            found = search_pairs(effects, trials, known, refitted, problem, self.tell)
-            trials = best_of_each([*trials, *(t.beside(refitted).amid(louder) for t in found.trials)])
-            trials = [given, refitted, *trials]
-            given, refitted, *trials = beside_chance(trials, problem, self.key)
-            done = {t.effects for t in trials}
-            behind = [one for one in (*behind, *found.behind) if one.effects not in done]
-        return _Searched(given, refitted, trials, behind, left_out, lack)
-
-
-def _decided(found: _Searched, problem: Problem, *, lasting: bool) -> tuple[Problem, _Searched, Decision]:
+def _decided(found: Searched, problem: Problem, *, lasting: bool) -> tuple[Problem, Searched, Decision]:
     """The verdict; where no cause is named, that of records of which a share of the force is forgiven to all.
 
     Where the model is wrong in a `lasting` run its predictions over some periods do not make it consistent.
     """
     periods = sum(n.record.duration / n.period for n in problem.records)
 
-    def decision_of(found: _Searched, problem: Problem, **how) -> Decision:
+    def decision_of(found: Searched, problem: Problem, **how) -> Decision:
         mapped = partial(stand_in, problem=problem)
 
         def decided(trials: Sequence[Trial]) -> Decision:
             return decide(found.given, found.refitted, trials, mapped, found.lack, periods, **how)
 
-        return first_alone(decided(found.trials), found.trials, found.refitted, decided)
+        decision = first_alone(decided(found.trials), found.trials, found.refitted, decided)
+        # What a law depends on is open where its numbers are not the same in all records.
+        varies = any(d.wide and d.path not in problem.model.entries() for d in differences(decision.winner))
+        return decision.open() if decision.verdict == "cause" and varies else decision
 
     told = {"untold": untold(problem.records), "in_step": in_step(problem.records), "lasting": lasting}
     decision = decision_of(found, problem, imposed=problem.imposed, **told)
@@ -251,33 +156,19 @@ def _decided(found: _Searched, problem: Problem, *, lasting: bool) -> tuple[Prob
     problem, (given, refitted, *trials) = again
     compared, best = {t.effects for t in trials}, min(t.rung for t in found.trials)
     dropped = [LeftBehind(t.effects, t.rung - best) for t in found.trials if t.effects not in compared]
-    found = _Searched(given, refitted, trials, [*found.behind, *dropped], found.left_out, LackOfFit(problem))
+    found = Searched(given, refitted, trials, [*found.behind, *dropped], found.left_out, LackOfFit(problem))
     return problem, found, decision_of(found, problem, forgiven=True, lasting=lasting)
 
 
-def _believed(
-    training: Sequence[tuple[Record, int]], model: Structure, reconstruction: Reconstruction
-) -> tuple[Problem, Trial, Trial]:
-    """The problem, the model as given, and refitted."""
-    whole, until = [whole for whole, _ in training], [fit for _, fit in training]
-    problem = Problem(model, prepare_all(whole, model, reconstruction), until)
-    given, refitted = fit_model(problem)
-    if _outweighed(model, refitted.structure):
-        # The noise of the force acts through the mass, and all hypotheses share one noise: that of the likelier mass.
-        problem = problem._replace(records=prepare_all(whole, model, reconstruction, weighed=refitted.structure))
-        given, refitted = fit_model(problem, near=refitted)
-    return problem, given, refitted
-
-
 def _concluded(
-    found: _Searched,
+    found: Searched,
     problem: Problem,
     clipped: Sequence[Clipping],
     model: Structure,
     stated: Structure,
     held: Sequence[HeldOut],
     key: jax.Array,
-) -> tuple[Problem, _Searched, Decision, Structure, Gain | None, list[dict]]:
+) -> tuple[Problem, Searched, Decision, Structure, Gain | None, list[dict]]:
     """The verdict as held-out readings leave it, what it rests on, and what `_confirmed` tells beside.
 
     It is reached anew where predictions over some periods make the model consistent and the whole run does not.
@@ -313,24 +204,23 @@ def _confirmed(
     decides.
     """
 
-    def gained(extended: Structure) -> tuple[Gain | None, list[dict]]:
+    def gained(extended: StructureOf) -> tuple[Gain | None, list[dict]]:
         if not held:
             return None, []
         noise = noise_levels(decision.winner, first)
-        return measure_gain(stated, refitted.extended(), extended, held, noise, first, key)
+        return measure_gain(stated, refitted.extended, extended, held, noise, first, key)
 
-    extended = model if decision.verdict == "consistent" else decision.winner.extended()
+    extended = (lambda record: model) if decision.verdict == "consistent" else decision.winner.extended
     gain, runs = gained(extended)
     if gain is not None and (against := _speaks_against(gain, decision, lasting=lasting)):
         decision = decision.refused(against, refitted)
-        extended = refitted.extended()
+        extended = refitted.extended
         gain, runs = gained(extended)
     if gain is not None and (by_class := decision.by_class()) is not None:
-        near = by_class.winner.extended()
-        confirmed, runs_of_it = gained(near)
+        confirmed, runs_of_it = gained(by_class.winner.extended)
         if confirmed is not None and confirmed.closed >= ALMOST_ALL:
-            return by_class, near, confirmed, runs_of_it
-    return decision, extended, gain, runs
+            return by_class, by_class.winner.extended(), confirmed, runs_of_it
+    return decision, extended(None), gain, runs
 
 
 def _falls_out_of_step(gain: Gain) -> bool:
@@ -351,28 +241,6 @@ def _speaks_against(gain: Gain, decision: Decision, *, lasting: bool = False) ->
     if (decision.verdict == "unnamed" or lasting) and gain.closable and gain.closed < GATE:
         return "closes less than half of the error on held-out readings"
     return ""
-
-
-def _later(trial: Trial, much: float) -> bool:
-    """Whether a trial leaves nothing of what was fitted, but `much` of what was kept back, as a share of the signal."""
-    fitted, kept_back = (np.sqrt(trial.prediction.beyond[first::2]) for first in (0, 1))
-    return white(trial) and bool(np.all(fitted < NEGLIGIBLE) and np.any(kept_back > much))
-
-
-def _beside(
-    alone: list[Trial], refitted: Trial, every: list[Candidate], lack: LackOfFit, *, imposed: bool
-) -> list[Effect]:
-    """Effects that are worth a try beside others, after what single ones leave."""
-    effects = [effect for candidate in every for effect in candidate.effects]
-    if something_left(alone, refitted, lack, imposed=imposed):
-        return effects
-    return [e for e in effects if e.cause.effect in hidden(alone)]
-
-
-def _outweighed(model: Structure, refitted: Structure) -> bool:
-    """Whether a refit moves any mass by more than some per cent."""
-    stated, found = (np.asarray(s.mass) for s in (model, refitted))
-    return bool(np.any(np.abs(found - stated) > _HEAVIER * np.abs(stated)))
 
 
 class _Steps:

@@ -33,6 +33,10 @@ _BLOCK, _FEWEST, _MOST_BLOCKS = 2.0, 5, 20
 _RESAMPLED = 1000
 
 
+StructureOf = Callable[[int | None], Structure]
+"""The structure of a record, by its number; that of one that was not fitted (None)."""
+
+
 @dataclass(frozen=True)
 class ChannelGain:
     """Root mean square error of a channel's free run, in its unit, and as a share of its spread."""
@@ -107,8 +111,8 @@ def how_run(fitted: Nuisances) -> list[str]:
 
 def measure_gain(
     given: Structure,
-    refitted: Structure,
-    extended: Structure,
+    refitted: StructureOf,
+    extended: StructureOf,
     held: Sequence[HeldOut],
     noise: Mapping[tuple, float],
     fitted: Nuisances,
@@ -126,8 +130,9 @@ def measure_gain(
     }
     curves = []
     pieces: list[np.ndarray] = []
-    remembers = any(term.states or term.delay is not None for term in extended.terms)
+    remembers = any(term.states or term.delay is not None for term in extended(None).terms)
     for part in held:
+        models = {"before": given, "refitted": refitted(part.of), "after": extended(part.of)}
         period = fitted.period / part.record.dt
         # What remembers shows at no instant: it is led to where a run begins, or would begin relaxed.
         lead = math.ceil(_LEAD * period) if remembers else 0
@@ -136,11 +141,8 @@ def measure_gain(
         window = _window(min(s.stop - s.start for s in stretches), period)
         counted = _counted(record, stretches, window, begin)
         run_of = partial(_run, stretches=stretches, window=window, reconstruction=fitted.reconstruction)
-        runs = {
-            name: run_of(model, record)
-            for name, model in (("before", given), ("refitted", refitted), ("after", extended))
-        }
-        left = _noise(partial(run_of, extended), record, counted, runs["after"], noise, seed)
+        runs = {name: run_of(model, record) for name, model in models.items()}
+        left = _noise(partial(run_of, models["after"]), record, counted, runs["after"], noise, seed)
         pieces += _blocks(record, [runs["before"], runs["after"]], counted, period)
         for channel, y in record.answers.items():
             for name, run in runs.items():

@@ -18,10 +18,14 @@ _LEAST = 0.2
 
 @dataclass(frozen=True)
 class HeldOut:
-    """A record on which the gain is measured; samples before `begin` were fitted, and do no more than lead there."""
+    """A record on which the gain is measured; samples before `begin` were fitted, and do no more than lead there.
+
+    It is a part `of` a fitted record, or of none.
+    """
 
     record: Record
     begin: int = 0
+    of: int | None = None
 
     def led_by(self, samples: int) -> tuple[Record, int]:
         """The record from so many samples before what was held out, and where that begins in it.
@@ -50,23 +54,23 @@ def split(
             raise ValueError(
                 f"`holdout` as a share must lie between 0 and 1, e.g. 0.3; got {holdout}. None keeps nothing back."
             )
-        parts = [(_first if first else _last)(r, holdout) for r in records]
+        parts = [(_first if first else _last)(r, holdout, i) for i, r in enumerate(records)]
         return [fitted for fitted, _ in parts], [held for _, held in parts]
     every = [] if holdout is None else [holdout] if isinstance(holdout, Record) else list(holdout)
     return [(r, len(r)) for r in records], [HeldOut(r) for r in every]
 
 
-def _first(record: Record, share: float) -> tuple[tuple[Record, int], HeldOut]:
+def _first(record: Record, share: float, which: int) -> tuple[tuple[Record, int], HeldOut]:
     """The first part held out."""
     begin = int(round(share * len(record)))
-    return (record[begin:].noted(_LATER), len(record) - begin), HeldOut(record[:begin])
+    return (record[begin:].noted(_LATER), len(record) - begin), HeldOut(record[:begin], of=which)
 
 
-def _last(record: Record, share: float) -> tuple[tuple[Record, int], HeldOut]:
+def _last(record: Record, share: float, which: int) -> tuple[tuple[Record, int], HeldOut]:
     """The last part held out; of a released structure that of its motion, which is run from the release."""
     moving = len(record) if record.driven else moves_for(record)
     end = int(round((1 - share) * moving))
-    return (record, end), HeldOut(record[:moving], end)
+    return (record, end), HeldOut(record[:moving], end, which)
 
 
 def moves_for(record: Record) -> int:

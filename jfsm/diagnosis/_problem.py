@@ -3,19 +3,20 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ..identification import Hypothesis, Nuisances, Posterior
+from ..identification import Hypothesis, Nuisances, Posterior, prepare_all
 from ..structures import Structure
 from ._begin import Begin
-from ._candidates import hypothesis
+from ._candidates import Apart, hypothesis
 from ._trial import Trial
 
 
 class Problem(NamedTuple):
-    """A model, records as the likelihood sees them, and how many samples of each are fitted."""
+    """A model, records as the likelihood sees them, how many samples of each are fitted, and what they do not share."""
 
     model: Structure
     records: Sequence[Nuisances]
     until: Sequence[int]
+    apart: Apart = Apart.nothing
 
     @property
     def first(self) -> Nuisances:
@@ -31,11 +32,16 @@ class Problem(NamedTuple):
         """The same, in steps that are short enough for all of these structures."""
         return self._replace(records=[n.resolving(starts) for n in self.records])
 
+    def weighed(self, structure: Structure) -> "Problem":
+        """The same, the noise of its forces acting through the masses of another structure."""
+        records = [n.record for n in self.records]
+        return self._replace(records=prepare_all(records, self.model, self.first.reconstruction, weighed=structure))
+
     def posterior(
         self, starts: Sequence[Structure], begins: Sequence[Begin | None] = (), *, refit: bool = True
     ) -> Posterior:
         """The posterior of structures that climb side by side."""
-        posed = hypothesis(self.model, starts, self.records, refit=refit, begins=begins)
+        posed = hypothesis(self.model, starts, self.records, refit=refit, begins=begins, apart=self.apart)
         return Posterior(posed, self.records, self.until)
 
     def posterior_of(self, trial: Trial) -> Posterior:

@@ -10,6 +10,7 @@ import numpy as np
 from ..identification import Nuisances
 from ..structures import PARAMETER_CAUSES, Cause, Clipping, Structure, causes
 from ._adequacy import NEGLIGIBLE
+from ._between import Difference, differences
 from ._candidates import Candidate
 from ._class import WIDER, class_of
 from ._clipped import finding
@@ -20,9 +21,11 @@ from ._diagnosis import CandidateResult, Diagnosis, Estimate, Finding, Rival
 from ._effect import Effect, names, places
 from ._gain import Gain, how_run
 from ._next import RIVAL, Leading
+from ._problem import Problem
 from ._residual import Residual, curves
 from ._search import LeftBehind
 from ._shape import Shape, shape_of
+from ._steady import unsteady
 from ._trial import Trial
 
 _SHOWN = 2000
@@ -48,16 +51,15 @@ def assemble(
     clipped: list[Clipping],
     refitted: Trial,
     tested: Tested,
-    model: Structure,
+    problem: Problem,
     extended: Structure,
-    records: Sequence[Nuisances],
     missing: Residual,
     gain: Gain | None,
     runs: list[dict],
     leading: Leading | None,
 ) -> Diagnosis:
     """The diagnosis, with everything that the report needs."""
-    trials = tested.trials
+    trials, model, records = tested.trials, problem.model, problem.records
     units = records[0].record.units
     findings = _findings(decision, trials, model, records[0])
     if decision.verdict == "cause":
@@ -74,11 +76,14 @@ def assemble(
     refit = {
         p: _estimate(winner, p, model, units) for p in model.entries() if any(u.path == p for u in winner.unknowns)
     }
-    notes = tuple(dict.fromkeys([*(note for n in records for note in n.notes), *how_run(records[0])]))
+    between = [] if decision.verdict == "consistent" else differences(winner)
+    differ = [_in_each(one, _unit(winner.structure, one.path, units)) for one in between]
+    said = [*(note for n in records for note in n.notes), *how_run(records[0]), *differ, *unsteady(winner, problem)]
+    notes = tuple(dict.fromkeys(said))
     noise = {f"{kind} {j}": float(s) for n in records[:1] for (kind, j), s in zip(n.channels, n.floor, strict=True)}
     smallest = _detectable(tested.seen, units)
     shape = None if decision.verdict == "consistent" else shape_of(missing)
-    sentence, advice = _words(decision, findings, gain, shape, imposed=records[0].path is not None)
+    sentence, advice = _words(decision, findings, gain, shape, differ, imposed=records[0].path is not None)
     data = {
         "jfsm": _version(),
         "verdict": decision.verdict,
@@ -90,6 +95,7 @@ def assemble(
         "findings": [_plain(f) for f in findings],
         "candidates": [_plain(c) for c in candidates],
         "refitted": {p: {"given": model.values()[p], **_plain(e)} for p, e in refit.items()},
+        "between_records": {one.path: [list(interval) for interval in one.intervals] for one in between},
         "gain": None if gain is None else _gain(gain),
         "shape": None if shape is None else {**_plain(shape._asdict()), "words": shape.words},
         "notes": list(notes),
@@ -223,12 +229,13 @@ def _finding(which: int, decision: Decision, trials: list[Trial], model: Structu
 def _wrong_values(t: Trial, probability: float, model: Structure, units) -> tuple[Finding, ...]:
     """Own values that moved by more than their error and than a third of what they are trusted to."""
     found = []
+    apart = {one.path for one in differences(t)}
     for k, u in enumerate(t.unknowns):
-        if u.record is not None or u.path not in model.entries():
+        if u.path not in model.entries() or u.path.startswith("offset@") or u.record not in (None, 0):
             continue
         moved, sd = abs(t.theta[k] - u.center), math.sqrt(max(t.covariance[k, k], 0.0))
         kind, place = u.path.split(".")[0].split("@")
-        if kind in PARAMETER_CAUSES and moved > 3 * sd and moved > u.width / 3:
+        if kind in PARAMETER_CAUSES and (u.path in apart or (moved > 3 * sd and moved > u.width / 3)):
             at = tuple(int(p) for p in place.split("-"))
             name = u.path.split(".")[-1] if "." in u.path else "mass"
             sentence = f"{kind} is off: stated {model.values()[u.path]:.6g}, found {t.interval(u.path)[0]:.6g}"
@@ -276,7 +283,13 @@ def _passed_over(c: Candidate) -> CandidateResult:
 
 
 def _words(
-    decision: Decision, findings: tuple[Finding, ...], gain: Gain | None, shape: Shape | None, *, imposed: bool
+    decision: Decision,
+    findings: tuple[Finding, ...],
+    gain: Gain | None,
+    shape: Shape | None,
+    differ: list[str],
+    *,
+    imposed: bool,
 ) -> tuple[str, str]:
     error = "error of the predicted force" if imposed else "free-run error"
     share = (
@@ -290,13 +303,13 @@ def _words(
     if decision.verdict == "parameters":
         what = "; ".join(f.sentence for f in findings) or "its own values moved together"
         use = "Use the refitted values." if pays else _NO_GAIN
-        return f"The form of the model is right, its values are off: {what}.{share}", use
+        return " ".join([f"The form of the model is right, its values are off: {what}.", *differ]) + share, use
     if decision.verdict == "cause":
         known = dict(causes()) | {e.cause.id: e.cause for e in decision.winner.effects}
         said = " ".join(_said(f, known) for f in findings) + _remainder(decision.winner)
         if decision.near is decision.winner:
             said += " Its shape is not quite that of any law that was tried."
-        return f"{said}{share}", "Use the extended model." if pays else _NO_GAIN
+        return " ".join([said, *differ]) + share, "Use the extended model." if pays else _NO_GAIN
     if decision.verdict == "unnamed":
         looks = "" if shape is None else f" {shape.words}"
         return (
@@ -308,6 +321,13 @@ def _words(
         "Something is wrong beyond noise, and this record cannot tell what.",
         f"Record a second run with another amplitude, or {more}.",
     )
+
+
+def _in_each(difference: Difference, unit: str) -> str:
+    """What differs between records, and what it is in each."""
+    told = enumerate(difference.intervals, start=1)
+    each = [f"{value:.4g} [{low:.4g}, {high:.4g}] in record {i}" for i, (value, low, high) in told]
+    return f"Records differ: {difference.path} [{unit}] is {', '.join(each)}."
 
 
 def _remainder(winner: Trial) -> str:

@@ -55,6 +55,8 @@ _ALIKE = 20.0
 """Nats behind the best pair up to which effects of others of its families are tried together, too."""
 _FROM_THERE = _Way(LADDER[-1:], 1, 1.0)
 """From numbers of what is akin."""
+_AGAIN = 6
+"""Trials of one problem that are fitted in another, the first in evidence and the first in prediction."""
 
 
 class LeftBehind(NamedTuple):
@@ -226,6 +228,20 @@ def search_akin(
         behind = [c for c in every if c.effects not in done and evidence.get(c.effects, -math.inf) < t.evidence]
         wider += [c for law in t.laws for c in general_cases(t, law, behind, problem)]
     return _from_there(tried + wider, known, problem, tell)
+
+
+def search_again(told: Sequence[Trial], refitted: Trial, problem: Problem, tell: Tell) -> Found:
+    """The best that another problem told, as pieces of long records, fitted from there.
+
+    These are the most probable, those that predict best, and the effects of pairs one by one.
+    """
+    ways = (lambda t: -t.evidence, lambda t: float(np.sum(t.prediction.error)))
+    best = {t.effects: t for way in ways for t in sorted(told, key=way)[:_AGAIN]}
+    parts = {(effect,) for effects in best if len(effects) > 1 for effect in effects}
+    best |= {t.effects: t for t in told if t.effects in parts}
+    tried = [Candidate(t.effects, (t.effects_on(problem.model),), begin=own_part(found_in(t))) for t in best.values()]
+    lots = [_Lot(beginnings, problem, _FROM_THERE.ladder) for beginnings in groups(tried, None)]
+    return _climbed(lots, _FROM_THERE._replace(to_the_end=True), lots, refitted, tell)
 
 
 def search_known(found: Trial, others: Found, problem: Problem, tell: Tell) -> Found:

@@ -1,6 +1,7 @@
 """One hypothesis fitted: its values, its evidence, and how well it predicts."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -121,9 +122,27 @@ class Trial:
             model = model + part
         return model
 
-    def extended(self) -> Structure:
-        """The structure without the offsets that are not significant."""
-        return without_small_offsets(self.structure, self.unknowns, self.theta, self.covariance)
+    def extended(self, record: int | None = None) -> Structure:
+        """The structure without the offsets that are not significant.
+
+        What each record has to itself is that of `record`, or the mean of all.
+        """
+        structure = without_small_offsets(self.structure, self.unknowns, self.theta, self.covariance)
+        of = {path: records if record is None else [record] for path, records in self.apart.items()}
+        return structure.with_values({path: self._mean(path, records) for path, records in of.items()})
+
+    @property
+    def apart(self) -> dict[str, list[int]]:
+        """Numbers of the structure that each record has to itself, by path, and these records; offsets aside."""
+        found, entries = dict[str, list[int]](), self.structure.entries()
+        for u in self.unknowns:
+            if u.record is not None and u.path in entries and not u.path.startswith("offset@"):
+                found.setdefault(u.path, []).append(u.record)
+        return found
+
+    def _mean(self, path: str, records: Sequence[int]) -> float:
+        value, low, high = np.array([self.interval(path, record) for record in records]).T
+        return float(np.average(value, weights=1.0 / np.maximum(high - low, np.finfo(float).tiny) ** 2))
 
     def beside(self, baseline: "Trial") -> "Trial":
         """The same, its prediction judged beside that of a baseline."""
@@ -133,9 +152,10 @@ class Trial:
         """The same, its prediction judged amid so much more noise per set."""
         return replace(self, prediction=replace(self.prediction, expected=self.prediction.expected + noise))
 
-    def interval(self, path: str, width: float = 1.96) -> tuple[float, float, float]:
-        """Value, low and high of an unknown; symmetric in its own coordinate."""
-        return interval(self.unknowns, self.theta, self.covariance, path, width)
+    def interval(self, path: str, record: int | None = None) -> tuple[float, float, float]:
+        """Value and 95 % interval of an unknown; symmetric in its own coordinate. Of one that each record has to
+        itself, that of the first, or of `record`."""
+        return interval(self.unknowns, self.theta, self.covariance, path, record=record)
 
 
 def ended(t: Trial) -> list[tuple[Unknown, float]]:
@@ -145,7 +165,7 @@ def ended(t: Trial) -> list[tuple[Unknown, float]]:
 
 def own_values(t: Trial) -> list[tuple[Unknown, float]]:
     """The model's own values among a trial's unknowns, and where they ended."""
-    return [(u, theta) for u, theta in ended(t) if u.record is None and math.isfinite(u.degrees)]
+    return [(u, theta) for u, theta in ended(t) if math.isfinite(u.degrees) and not u.path.startswith("offset@")]
 
 
 def sets(nuisances: Nuisances, until: int) -> list[np.ndarray]:

@@ -76,18 +76,24 @@ class Unknown:
 
 def values_of(unknowns: Sequence[Unknown], theta: Sequence[float] | np.ndarray) -> list[float]:
     """The numbers themselves."""
-    exponents = {u.path: u.value(t) for u, t in zip(unknowns, theta, strict=True)}
-    return [u.value(t, exponents[u.tie[0]] if u.tie else 0.0) for u, t in zip(unknowns, theta, strict=True)]
+    exponents = {(u.path, u.record): u.value(t) for u, t in zip(unknowns, theta, strict=True)}
+    return [u.value(t, exponents[u.tie[0], u.record] if u.tie else 0.0) for u, t in zip(unknowns, theta, strict=True)]
 
 
 def interval(
-    unknowns: Sequence[Unknown], theta: np.ndarray, covariance: np.ndarray, path: str, width: float = 1.96
+    unknowns: Sequence[Unknown],
+    theta: np.ndarray,
+    covariance: np.ndarray,
+    path: str,
+    width: float = 1.96,
+    record: int | None = None,
 ) -> tuple[float, float, float]:
     """Value of an unknown, and what it is so many standard errors below and above, within its bounds.
 
-    They are symmetric in its own coordinate.
+    They are symmetric in its own coordinate. Of one that each record has to itself, that of the first, or of `record`.
     """
-    paths = [u.path for u in unknowns]
+    mine = [u.record is None or record is None or u.record == record for u in unknowns]
+    paths = [u.path if ours else "" for u, ours in zip(unknowns, mine, strict=True)]
     k = paths.index(path)
     u, t, slope, exponent = unknowns[k], theta[k], np.zeros(theta.size), 0.0
     slope[k] = 1.0

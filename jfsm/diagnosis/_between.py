@@ -1,0 +1,47 @@
+"""Whether records of one structure differ in what they should share."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ._adequacy import GATE, adequate, explained, unexplained
+from ._standing import UNPREDICTED
+from ._trial import Trial
+
+_APART = 3.0
+"""Standard errors between two records from which a number differs between them,"""
+_OPEN = 0.3
+"""and share of the smallest from which a law is not the same in both."""
+
+
+class Difference(NamedTuple):
+    """A number that records do not share, by its path: value and 95 % interval in each."""
+
+    path: str
+    intervals: tuple[tuple[float, float, float], ...]
+
+    @property
+    def wide(self) -> bool:
+        """Whether it differs by more than a law's number may."""
+        sizes = [abs(value) for value, _, _ in self.intervals]
+        return max(sizes) > (1.0 + _OPEN) * min(sizes)
+
+
+def differ(apart: Trial, shared: Trial) -> bool:
+    """Whether records differ in what they share in a trial, beside the same where they need not.
+
+    No two measured records are quite alike: they must explain half of what the other leaves, if it leaves anything.
+    """
+    tells = not np.any(unexplained(shared)) and adequate(apart)
+    return apart.evidence - shared.evidence > UNPREDICTED and (tells or explained(apart, shared) >= GATE)
+
+
+def differences(t: Trial) -> list[Difference]:
+    """Numbers of a trial that differ between records by more than their errors."""
+    found = []
+    for path, records in t.apart.items():
+        mine = [k for k, u in enumerate(t.unknowns) if u.path == path]
+        theta, variance = t.theta[mine], np.diag(t.covariance)[mine]
+        if np.max(np.abs(theta[:, None] - theta) / np.sqrt(variance[:, None] + variance)) > _APART:
+            found.append(Difference(path, tuple(t.interval(path, record) for record in records)))
+    return found

@@ -1,0 +1,220 @@
+"""How records are looked into: what they tell beside the model, and what was tried for it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import jax
+import numpy as np
+
+from ..dynamics import Reconstruction
+from ..identification import prepare_all
+from ..records import Record
+from ..structures import Cause, Structure
+from ._adequacy import GATE, MUCH, NEGLIGIBLE, explained, white
+from ._between import differ
+from ._candidates import Apart, Candidate, as_promising, candidates, contained, promising
+from ._chance import beside_chance, noise_beyond
+from ._effect import Effect
+from ._enough import hidden, settled, something_left
+from ._lack_of_fit import LackOfFit
+from ._pieces import pieces
+from ._problem import Problem
+from ._search import (
+    LeftBehind,
+    best_of_each,
+    fit_model,
+    refit_from,
+    search,
+    search_again,
+    search_akin,
+    search_known,
+    search_pairs,
+)
+from ._trial import Trial
+from ._untold import in_step
+
+_HEAVIER = 0.03
+"""Change of a mass, as a share of it, from which its noise is another."""
+
+
+@dataclass(frozen=True)
+class Searched:
+    """Every trial, the candidates that were not pursued to their tops, and those that were not tried."""
+
+    given: Trial
+    refitted: Trial
+    trials: list[Trial]
+    behind: list[LeftBehind]
+    left_out: list[Candidate]
+    lack: LackOfFit
+
+    @property
+    def every(self) -> list[Trial]:
+        return [self.given, self.refitted, *self.trials]
+
+
+@dataclass(frozen=True)
+class Study:
+    """How records are looked into."""
+
+    model: Structure
+    chosen: dict[str, Cause]
+    places: Sequence[tuple[int, int]] | None
+    reconstruction: Reconstruction
+    key: jax.Array
+    tell: Callable[[str, int], None]
+    pairs: bool
+
+    def of(
+        self, training: Sequence[tuple[Record, int]], *, unless_later: bool = False, known: Trial | None = None
+    ) -> tuple[Problem, list[Candidate], Searched] | Trial:
+        """What is fitted to, what could be tried, what was found.
+
+        Where what is lacking shows in what was kept back, which then has to be fitted, the best single trial beside
+        which it does, `unless_later`; that is `known` then.
+        """
+        problem = _problem(training, self.model, self.reconstruction)
+        parts = pieces(training, [n.period for n in problem.records])
+        if parts is None:
+            problem, given, refitted = _believed(problem)
+            if unless_later and _later(refitted, NEGLIGIBLE):
+                return refitted
+            every, found = self._sought(problem, given, refitted, known)
+        else:
+            part, given, refitted = _believed(_problem(parts, self.model, self.reconstruction))
+            every, ahead = self._sought(part, given, refitted, known)
+            problem, given, refitted = _believed(problem, near=refitted)
+            found = self._fitted_again(ahead, given, refitted, problem)
+            if unless_later and _later(found.refitted, NEGLIGIBLE):
+                return found.refitted
+        best = max(found.every, key=lambda t: t.evidence)
+        if unless_later and _later(best, MUCH):
+            return max((t for t in found.every if len(t.effects) < 2), key=lambda t: t.evidence)
+        problem, found = self._unless_apart(found, problem)
+        return problem, every, found
+
+    def _sought(
+        self, problem: Problem, given: Trial, refitted: Trial, known: Trial | None
+    ) -> tuple[list[Candidate], Searched]:
+        """What could be tried, and what was found."""
+        every = candidates(self.model, problem.records, self.chosen, self.places)
+        return every, self._searched(every, given, refitted, known, problem)
+
+    def _fitted_again(self, ahead: Searched, given: Trial, refitted: Trial, problem: Problem) -> Searched:
+        """The best of what was found in another problem, as in pieces of long records, fitted from there."""
+        found = search_again(ahead.trials, refitted, problem, self.tell)
+        refitted = refit_from(found.trials, refitted, problem)
+        _, (given, refitted, *trials) = self._amid_noise(given, refitted, found.trials, problem)
+        done, best = {t.effects for t in trials}, min((t.rung for t in ahead.trials), default=0.0)
+        dropped = [LeftBehind(t.effects, t.rung - best) for t in ahead.trials if t.effects not in done]
+        return Searched(given, refitted, trials, [*ahead.behind, *dropped], ahead.left_out, LackOfFit(problem))
+
+    def _unless_apart(self, found: Searched, problem: Problem) -> tuple[Problem, Searched]:
+        """What was found, or the best of it with numbers that each record has to itself, where records differ in them.
+
+        These have to do so beside the best explanation, not make up for one that is missing.
+        """
+        for apart in (Apart.own, Apart.all) if len(problem.records) > 1 else ():
+            other, best = problem._replace(apart=apart), max(found.every, key=lambda t: t.evidence)
+            if best.effects:
+                [alone] = search_again([best], best, other, self.tell).trials
+            else:
+                alone = refit_from([best], best, other)
+            if differ(alone.beside(best), best):
+                problem, given, refitted = _believed(other, near=found.refitted)
+                found = self._fitted_again(found, given, refitted, problem)
+        return problem, found
+
+    def _searched(
+        self,
+        every: list[Candidate],
+        given: Trial,
+        refitted: Trial,
+        known: Trial | None,
+        problem: Problem,
+    ) -> Searched:
+        """Single effects fitted, the promising ones first, and pairs of them where that leaves something."""
+        stands_for_the_drive = in_step(problem.records)
+
+        def told(trials: Sequence[Trial]) -> list[Trial]:
+            return [t for t in trials if not stands_for_the_drive(t)]
+
+        def close(trials: Sequence[Trial]) -> list[Trial]:
+            best = max(told([given, refitted, *trials]), key=lambda t: t.evidence)
+            return [t for t in trials if t is best or explained(t, refitted) >= GATE]
+
+        tried, left_out = promising(every)
+        found = search(tried, given, refitted, problem, self.tell)
+        if settled(told([given, refitted, *found.trials])):
+            best = max(found.trials, key=lambda t: t.evidence)
+            more = contained([law for t in close(found.trials) for law in t.laws], left_out)
+            more += [c for c in as_promising(best.effects, every, left_out) if c not in more]
+        else:  # of a missing force that is ill seen regression may put the right law last
+            more = [c for c in left_out if c.starts]
+        if more:
+            found = found.and_then(search(more, given, refitted, problem, self.tell))
+            left_out = [c for c in left_out if c not in more]
+        found = search_akin(close(found.trials), every, found, problem, self.tell)
+        if known is not None and known.effects:
+            found = search_known(known, found, problem, self.tell)
+        behind, refitted = found.behind, refit_from(found.trials, refitted, problem)
+        louder, (given, refitted, *trials) = self._amid_noise(given, refitted, found.trials, problem)
+        lack, alone = LackOfFit(problem), told([given, refitted, *trials])
+        effects = _beside(alone, refitted, every, lack, imposed=problem.imposed) if self.pairs else []
+        if effects:
+            found = search_pairs(effects, trials, known, refitted, problem, self.tell)
+            trials = best_of_each([*trials, *(t.beside(refitted).amid(louder) for t in found.trials)])
+            trials = [given, refitted, *trials]
+            given, refitted, *trials = beside_chance(trials, problem, self.key)
+            done = {t.effects for t in trials}
+            behind = [one for one in (*behind, *found.behind) if one.effects not in done]
+        return Searched(given, refitted, trials, behind, left_out, lack)
+
+    def _amid_noise(
+        self, given: Trial, refitted: Trial, found: Sequence[Trial], problem: Problem
+    ) -> tuple[np.ndarray, list[Trial]]:
+        """All trials, judged beside the refit and amid what noise leaves; how much of it no channel told beforehand."""
+        trials = [given, refitted, *(t.beside(refitted) for t in found)]
+        louder = noise_beyond(trials, problem)
+        return louder, beside_chance([t.amid(louder) for t in trials], problem, self.key)
+
+
+def _problem(training: Sequence[tuple[Record, int]], model: Structure, reconstruction: Reconstruction) -> Problem:
+    """Records, and how much of each is fitted, as the likelihood sees them."""
+    records, until = [whole for whole, _ in training], [fit for _, fit in training]
+    return Problem(model, prepare_all(records, model, reconstruction), until)
+
+
+def _believed(problem: Problem, near: Trial | None = None) -> tuple[Problem, Trial, Trial]:
+    """The problem, the model as given, and refitted; `near` own values that a part of the records told."""
+    if near is None:
+        given, refitted = fit_model(problem)
+        near = refitted
+        if not _outweighed(problem.model, near.structure):
+            return problem, given, refitted
+    if _outweighed(problem.model, near.structure):
+        # The noise of the force acts through the mass, and all hypotheses share one noise: that of the likelier mass.
+        problem = problem.weighed(near.structure)
+    return problem, *fit_model(problem, near=near)
+
+
+def _later(trial: Trial, much: float) -> bool:
+    """Whether a trial leaves nothing of what was fitted, but `much` of what was kept back, as a share of the signal."""
+    fitted, kept_back = (np.sqrt(trial.prediction.beyond[first::2]) for first in (0, 1))
+    return white(trial) and bool(np.all(fitted < NEGLIGIBLE) and np.any(kept_back > much))
+
+
+def _beside(
+    alone: list[Trial], refitted: Trial, every: list[Candidate], lack: LackOfFit, *, imposed: bool
+) -> list[Effect]:
+    """Effects that are worth a try beside others, after what single ones leave."""
+    effects = [effect for candidate in every for effect in candidate.effects]
+    if something_left(alone, refitted, lack, imposed=imposed):
+        return effects
+    return [e for e in effects if e.cause.effect in hidden(alone)]
+
+
+def _outweighed(model: Structure, refitted: Structure) -> bool:
+    """Whether a refit moves any mass by more than some per cent."""
+    stated, found = (np.asarray(s.mass) for s in (model, refitted))
+    return bool(np.any(np.abs(found - stated) > _HEAVIER * np.abs(stated)))
