@@ -93,7 +93,6 @@ def test_a_special_case_that_stopped_on_its_way_is_fitted_from_the_law_that_hold
     every = candidates(MODEL, with_friction.records, chosen_causes(["stribeck", "coulomb"]))
     stribeck, coulomb = (next(c for c in every if c.effects[0].cause.id == name) for name in ("stribeck", "coulomb"))
     given, refitted = fitted
-    _, records, until = with_friction
     alone = search([stribeck], given, refitted, with_friction, tell)
     stopped = Found(alone.trials, [LeftBehind(coulomb.effects, 613.0)])
     found = search_akin(alone.trials, every, stopped, with_friction, tell)
@@ -189,7 +188,7 @@ def found_beside_friction(records: Any, *parts: Any, cause: str) -> Any:
 
 def test_a_single_effect_that_stopped_on_its_way_is_fitted_again_from_the_best_pair_that_has_it(with_friction, fitted):
     given, refitted = fitted
-    _, records, until = with_friction
+    records = with_friction.records
     every = candidates(MODEL, records, chosen_causes(["cubic_hardening", "coulomb"]))
     spring, friction = (
         next(c for c in every if c.effects[0].cause.id == name) for name in ("cubic_hardening", "coulomb")
@@ -203,7 +202,7 @@ def test_a_single_effect_that_stopped_on_its_way_is_fitted_again_from_the_best_p
 
 
 def test_the_force_that_is_missing_would_gain_most_beside_a_refit(with_friction, fitted):
-    _, records, until = with_friction
+    records = with_friction.records
     given, refitted = fitted
     laws = Laws(refitted.structure, records[0])
     tried = [jfsm.Coulomb(0.3, at=(0, 1)), jfsm.CubicStiffness(0.1, at=(0, 1))]
@@ -220,7 +219,7 @@ def test_the_force_that_is_missing_would_gain_most_beside_a_refit(with_friction,
 
 
 def test_a_number_with_which_the_motion_runs_away_says_nothing_of_what_a_force_would_gain(with_friction, fitted):
-    _, records, until = with_friction
+    records = with_friction.records
     _, refitted = fitted
     force = Laws(refitted.structure, records[0]).forces([jfsm.Coulomb(0.3, at=(0, 1))])
     (known,) = gains(refitted, with_friction, force)
@@ -230,7 +229,7 @@ def test_a_number_with_which_the_motion_runs_away_says_nothing_of_what_a_force_w
 
 
 def test_a_trial_is_looked_at_in_steps_no_longer_than_those_it_was_fitted_in(with_friction, fitted):
-    _, records, until = with_friction
+    records = with_friction.records
     _, refitted = fitted
     assert refitted.steps == (records[0].fine.substeps,)
     finer = replace(refitted, steps=(4 * records[0].fine.substeps,))
@@ -240,7 +239,7 @@ def test_a_trial_is_looked_at_in_steps_no_longer_than_those_it_was_fitted_in(wit
 
 def test_what_would_replace_an_effect_gains_what_that_gained_if_it_is_alike_and_loses_it_if_not(with_friction, fitted):
     given, refitted = fitted
-    _, records, until = with_friction
+    records = with_friction.records
     found = search(candidates(MODEL, records, chosen_causes(["coulomb"])), given, refitted, with_friction, tell)
     best = max(found.trials, key=lambda t: t.evidence)
     laws = Laws(best.structure.without(best.parts[0]), records[0])
