@@ -55,8 +55,8 @@ _ALIKE = 20.0
 """Nats behind the best pair up to which effects of others of its families are tried together, too."""
 _FROM_THERE = _Way(LADDER[-1:], 1, 1.0)
 """From numbers of what is akin."""
-_AGAIN = 6
-"""Trials of one problem that are fitted in another, the first in evidence and the first in prediction."""
+_AGAIN = 4
+"""Single effects, and pairs, of one problem that are fitted in another: the first in evidence, and in prediction."""
 
 
 class LeftBehind(NamedTuple):
@@ -233,10 +233,12 @@ def search_akin(
 def search_again(told: Sequence[Trial], refitted: Trial, problem: Problem, tell: Tell) -> Found:
     """The best that another problem told, as pieces of long records, fitted from there.
 
-    These are the most probable, those that predict best, and the effects of pairs one by one.
+    These are, of single effects and of pairs, the most probable and those that predict best, and the effects of such
+    pairs one by one.
     """
     ways = (lambda t: -t.evidence, lambda t: float(np.sum(t.prediction.error)))
-    best = {t.effects: t for way in ways for t in sorted(told, key=way)[:_AGAIN]}
+    alike = [[t for t in told if (len(t.effects) > 1) is many] for many in (False, True)]
+    best = {t.effects: t for these in alike for way in ways for t in sorted(these, key=way)[:_AGAIN]}
     parts = {(effect,) for effects in best if len(effects) > 1 for effect in effects}
     best |= {t.effects: t for t in told if t.effects in parts}
     tried = [Candidate(t.effects, (t.effects_on(problem.model),), begin=own_part(found_in(t))) for t in best.values()]
