@@ -22,12 +22,10 @@ from ._diagnosis import Diagnosis
 from ._forgiving import forgiving
 from ._gain import Gain, StructureOf, measure_gain
 from ._holdout import HeldOut, split
-from ._lack_of_fit import LackOfFit
 from ._next import Leading
 from ._problem import Problem
 from ._report import Tested, assemble
 from ._residual import residual, stand_in
-from ._search import LeftBehind
 from ._study import Searched, Study
 from ._trial import Trial
 from ._untold import in_step, untold
@@ -154,9 +152,7 @@ def _decided(found: Searched, problem: Problem, *, lasting: bool) -> tuple[Probl
     if again is None:
         return problem, found, decision
     problem, (given, refitted, *trials) = again
-    compared, best = {t.effects for t in trials}, min(t.rung for t in found.trials)
-    dropped = [LeftBehind(t.effects, t.rung - best) for t in found.trials if t.effects not in compared]
-    found = Searched(given, refitted, trials, [*found.behind, *dropped], found.left_out, LackOfFit(problem))
+    found = found.judged_in(problem, given, refitted, trials)
     return problem, found, decision_of(found, problem, forgiven=True, lasting=lasting)
 
 

@@ -241,15 +241,19 @@ def search_again(told: Sequence[Trial], refitted: Trial, problem: Problem, tell:
     best = {t.effects: t for these in alike for way in ways for t in sorted(these, key=way)[:_AGAIN]}
     parts = {(effect,) for effects in best if len(effects) > 1 for effect in effects}
     best |= {t.effects: t for t in told if t.effects in parts}
-    tried = [Candidate(t.effects, (t.effects_on(problem.model),), begin=own_part(found_in(t))) for t in best.values()]
+    tried = [_as_candidate(t, problem.model) for t in best.values()]
     lots = [_Lot(beginnings, problem, _FROM_THERE.ladder) for beginnings in groups(tried, None)]
     return _climbed(lots, _FROM_THERE._replace(to_the_end=True), lots, refitted, tell)
 
 
 def search_known(found: Trial, others: Found, problem: Problem, tell: Tell) -> Found:
     """What another part of the records told, fitted from there too."""
-    start = found.effects_on(problem.model)
-    return _from_there([Candidate(found.effects, (start,), begin=own_part(found_in(found)))], others, problem, tell)
+    return _from_there([_as_candidate(found, problem.model)], others, problem, tell)
+
+
+def _as_candidate(t: Trial, model: Structure) -> Candidate:
+    """A trial of another problem, to begin from its numbers; what one record had to itself is not known there."""
+    return Candidate(t.effects, (t.effects_on(model),), begin=own_part(found_in(t)))
 
 
 def _from_there(tried: Sequence[Candidate], known: Found, problem: Problem, tell: Tell) -> Found:

@@ -6,6 +6,7 @@ from ..identification import Nuisances
 from ._problem import Problem
 from ._trial import FILTERED, PREDICTED, Trial, windows
 
+_ADVICE = "A structure that changed, or a sensor that failed: diagnose the parts by themselves."
 _BLOCKS, _FEWEST = 20, 8
 """Blocks of a record, at most and at least; each holds a prediction."""
 _WORSE = 5.0
@@ -33,9 +34,6 @@ def unsteady(t: Trial, problem: Problem) -> list[str]:
             when = f" of record {index + 1}" if len(problem.records) > 1 else ""
             words.append(f"{kind.capitalize()} {j}{when} is predicted far worse {bad} than elsewhere. {_ADVICE}")
     return words
-
-
-_ADVICE = "A structure that changed, or a sensor that failed: diagnose the parts by themselves."
 
 
 def _bad_blocks(nuisances: Nuisances, channel: int, error: np.ndarray, free: np.ndarray) -> str | None:

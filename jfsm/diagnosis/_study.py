@@ -52,6 +52,12 @@ class Searched:
     def every(self) -> list[Trial]:
         return [self.given, self.refitted, *self.trials]
 
+    def judged_in(self, problem: Problem, given: Trial, refitted: Trial, trials: list[Trial]) -> "Searched":
+        """What was found, with these trials of another problem; those that were not fitted there are left behind."""
+        done, best = {t.effects for t in trials}, min((t.rung for t in self.trials), default=0.0)
+        dropped = [LeftBehind(t.effects, t.rung - best) for t in self.trials if t.effects not in done]
+        return Searched(given, refitted, trials, [*self.behind, *dropped], self.left_out, LackOfFit(problem))
+
 
 @dataclass(frozen=True)
 class Study:
@@ -105,9 +111,7 @@ class Study:
         found = search_again(ahead.trials, refitted, problem, self.tell)
         refitted = refit_from(found.trials, refitted, problem)
         _, (given, refitted, *trials) = self._amid_noise(given, refitted, found.trials, problem)
-        done, best = {t.effects for t in trials}, min((t.rung for t in ahead.trials), default=0.0)
-        dropped = [LeftBehind(t.effects, t.rung - best) for t in ahead.trials if t.effects not in done]
-        return Searched(given, refitted, trials, [*ahead.behind, *dropped], ahead.left_out, LackOfFit(problem))
+        return ahead.judged_in(problem, given, refitted, trials)
 
     def _unless_apart(self, found: Searched, problem: Problem) -> tuple[Problem, Searched]:
         """What was found, or the best of it with numbers that each record has to itself, where records differ in them.
