@@ -83,7 +83,17 @@ def somewhere(posterior: Posterior) -> np.ndarray:
     return start + 0.02 * np.random.default_rng(3).standard_normal(start.shape)
 
 
-@pytest.mark.parametrize("kind", ["smooth", "friction", "power"])
+@pytest.fixture(scope="module")
+def late(single_nuisances) -> Posterior:
+    """Of a force sensor and a channel that are late: what comes with every sample depends on the delays."""
+    structure = SINGLE + jfsm.ForceDelay(0.013, at=("force", 1)) + jfsm.ChannelDelay(0.021, at=("acceleration", 1))
+    paths = ("force_delay@force-1.tau", "channel_delay@acceleration-1.tau")
+    unknowns = tuple(effect_unknown(structure, path, single_nuisances) for path in paths)
+    own = tuple(own_unknown(structure, path, {}) for path in SINGLE.values())
+    return Posterior(Hypothesis((structure,), ((*own, *unknowns),)), [single_nuisances])
+
+
+@pytest.mark.parametrize("kind", ["smooth", "friction", "power", "late"])
 def test_the_gradient_is_that_of_the_value(kind, request):
     posterior: Posterior = request.getfixturevalue(kind)
     theta = somewhere(posterior)
@@ -98,7 +108,7 @@ def test_the_gradient_is_that_of_the_value(kind, request):
         assert difference == pytest.approx(gradient[k], rel=1e-4, abs=1e-5 * np.max(np.abs(gradient)) + 1e-2)
 
 
-@pytest.mark.parametrize("kind", ["smooth", "friction"])
+@pytest.mark.parametrize("kind", ["smooth", "friction", "late"])
 def test_the_information_is_made_of_the_slopes_of_the_innovations(kind, request):
     posterior: Posterior = request.getfixturevalue(kind)
     theta, step = somewhere(posterior)[0], 1e-6
@@ -194,11 +204,23 @@ def test_samples_after_the_end_that_counts_have_no_part(chain_nuisances, smooth)
     assert values[2] > values[0] + 100
 
 
+def test_the_first_readings_lead_unless_the_record_begins_quietly():
+    record = noisy_record(SINGLE, n=12_000)
+    channels = {name: getattr(record, name) for name in ("force", "displacement", "acceleration")}
+    quiet = np.where(record.time < record.time[7000], 0.01, 1.0)[:, None]
+    steady, begun_late = (
+        prepare(jfsm.Record(record.time, **{name: size * y for name, y in channels.items()}), SINGLE)
+        for size in (1.0, quiet)
+    )
+    assert steady.leading == 4096
+    assert begun_late.leading == 8192
+
+
 @pytest.fixture
 def traces(monkeypatch) -> list[None]:
     """One entry for each time that the likelihood is traced into a program."""
-    found, run = [], _likelihood._run
-    monkeypatch.setattr(_likelihood, "_run", lambda *args: found.append(None) or run(*args))
+    found, numbers = [], _likelihood._numbers
+    monkeypatch.setattr(_likelihood, "_numbers", lambda *args: found.append(None) or numbers(*args))
     return found
 
 

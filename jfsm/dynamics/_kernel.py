@@ -15,6 +15,9 @@ Found = TypeVar("Found")
 _KEPT = 40
 """Programs of a function that are kept, those used last: one of them takes up to fifty megabytes."""
 
+_OPTIONS = {"xla_backend_optimization_level": 1}
+"""On a processor. What LLVM does beyond that takes a quarter of the time of compiling, and gains none."""
+
 _refused = False
 """Whether this process has met a program that XLA does not make one kernel of."""
 
@@ -58,12 +61,11 @@ def jit_with_kernels(function: Callable[..., Found]) -> Callable[..., Found]:
 def _program(function: Callable[..., Found], static: Any, one_kernel: bool) -> Callable[..., Found]:
     """The function of what is not `static` among its arguments, compiled at its first call."""
 
-    @jax.jit
     @wraps(function)
     def program(dynamic):
         return function(*eqx.combine(dynamic, static), one_kernel=one_kernel)
 
-    return program
+    return jax.jit(program, compiler_options=_OPTIONS if jax.default_backend() == "cpu" else None)
 
 
 def one_kernel_scan(body: Callable[[Any, Any], tuple[Any, Any]], start: Any, inputs: Any) -> tuple[Any, Any]:

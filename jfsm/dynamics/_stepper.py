@@ -120,7 +120,7 @@ def with_friction(plant: Plant, minv, x, v, mode, a, t):
     return a, margin
 
 
-def mode_at(plant: Plant, minv, x, v, z, g, t, still=False):
+def mode_at(plant: Plant, minv, x, v, z, g, t, still: Array | bool = False):
     """Mode of each friction slot in a state: the sign of its speed; at rest, whether it sticks or which way it goes.
 
     Slots that are known to be `still` are at rest whatever rounding made of their speeds.

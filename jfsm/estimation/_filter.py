@@ -7,15 +7,26 @@ error: an acceleration is then judged under each mode, and the most probable one
 is that of all modes, each with its probability before the reading.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from ..dynamics._forces import friction_limits, settle
-from ..dynamics._grid import Fine, advance_sample, begin, drive_before, load_of, punctual, remember, true_force
+from ..dynamics._grid import (
+    Fine,
+    Past,
+    advance_sample,
+    begin,
+    drive_before,
+    load_of,
+    punctual,
+    remember,
+    true_force,
+)
 from ..dynamics._kernel import one_kernel_scan
 from ..dynamics._plant import Plant, Readout
 from ..dynamics._stepper import (
@@ -96,6 +107,64 @@ def _product(a, b):
     return jnp.stack([jnp.sum(a * b[:, j][None, :], 1) for j in range(b.shape[1])], 1)
 
 
+class State(NamedTuple):
+    """What a filter carries from sample to sample.
+
+    `mode` (slots,) is that of each friction slot, a whole number: it is no function of the plant's numbers. `overrun`
+    (slots,) tells how surely links sample.
+    """
+
+    x: Float[Array, " dof"]
+    v: Float[Array, " dof"]
+    z: Float[Array, " hidden"]
+    mode: Int[Array, " slots"]
+    past: Past
+    covariance: Float[Array, "state state"]
+    overrun: Float[Array, " slots"]
+
+    @property
+    def motion(self) -> Motion:
+        return Motion(self.x, self.v, self.z, self.mode.astype(self.x.dtype))
+
+
+class Known(NamedTuple):
+    """What a run of the filter knows throughout besides the plant: its inverse mass, the channels' noise variances."""
+
+    minv: Float[Array, "dof dof"]
+    variances: Float[Array, " channels"]
+
+
+class Drive(NamedTuple):
+    """What of the inputs of all samples depends on the plant where a sensor is late: the force, and what drove it
+    earlier, for every channel delay."""
+
+    force: Float[Array, "n halves dof"]
+    before: tuple[tuple[Array, Array], ...]
+
+
+class Sample(NamedTuple):
+    """The other inputs of all samples."""
+
+    base: Float[Array, "n halves"]
+    time: Float[Array, " n"]
+    values: Float[Array, "n channels"]
+    use: Float[Array, "n channels"]
+    valid: Float[Array, " n"]
+
+
+def begun(
+    plant: Plant, fine: Fine, readings: Readings, start: Start, log_scale: Float[Array, " channels"]
+) -> tuple[Known, State, Drive]:
+    """A run of the filter before its first sample."""
+    minv = inverse_mass(plant)
+    fine = punctual(plant, fine)
+    motion, past = begin(plant, minv, start.x, start.v, fine)
+    known = Known(minv, readings.variance * jnp.exp(log_scale))
+    beyond_doubt = jnp.full(len(plant.friction), _FAR)
+    state = State(*motion[:3], motion.mode.astype(int), past, start.covariance, beyond_doubt)
+    return known, state, Drive(fine.force, tuple(drive_before(fine, tau) for tau in plant.channel_delay))
+
+
 def innovations(
     plant: Plant,
     show: Readout,
@@ -113,47 +182,57 @@ def innovations(
     is predicted, not used: a stretch of such samples is a free prediction with its own error bar. A delay reaches back
     into the means of the filter. Where not many run at once, `one_kernel` is faster.
     """
-    minv = inverse_mass(plant)
-    dof, dt = plant.dof, fine.step
-    size = 2 * dof + plant.hidden
-    variances = readings.variance * jnp.exp(log_scale)
+    known, state, drive = begun(plant, fine, readings, start, log_scale)
+
+    def body(state, inputs):
+        return one_sample(plant, known, show, noise, fine.step, state, *inputs)
+
+    return loop_of(plant, one_kernel)(body, state, (drive, samples_of(fine, readings)))[1]
+
+
+def samples_of(fine: Fine, readings: Readings) -> Sample:
+    """Inputs of all samples that no plant changes."""
+    return Sample(fine.base, fine.time, readings.values, readings.use, readings.valid)
+
+
+def loop_of(plant: Plant, one_kernel: bool) -> Callable[..., Any]:
+    """`jax.lax.scan`, or the one kernel that is asked for, where the filter of this plant can be one."""
+    small = 2 * plant.dof + plant.hidden <= _FEW and plant.elementary
+    return one_kernel_scan if one_kernel and small else jax.lax.scan
+
+
+def one_sample(
+    plant: Plant, known: Known, show: Readout, noise: ProcessNoise, dt, state: State, drive: Drive, sample: Sample
+) -> tuple[State, Innovations]:
+    """State one sample later, and the innovations of this one; `drive` and `sample` are what comes with it."""
+    (minv, variances), motion, past = known, state.motion, state.past
+    dof, rows = plant.dof, plant.friction.direction
+    size, substeps = 2 * dof + plant.hidden, (drive.force.shape[0] - 1) // 2
     added = jnp.zeros((size, size)).at[dof : 2 * dof, dof : 2 * dof].set(noise.velocity)
-    fine = punctual(plant, fine)
-    rows = plant.friction.direction
     nothing = _NOTHING * jnp.sqrt(jnp.sum(rows[:, :, None] * noise.velocity[None] * rows[:, None, :], (1, 2)))
-
-    def body(carry, inputs):
-        motion, past, covariance, overrun = carry
-        force, base, time, y, use, valid, before = inputs
-        g = load_of(plant, minv, motion, past, force, base, time, dt)
-        mean, updated, found = _update(
-            plant, minv, show, motion, covariance, overrun, Load(g[:3], base[:3], time, dt / fine.substeps), before, y,
-            use, variances, nothing,
-        )  # fmt: skip
-        x, v, z = mean[:dof], mean[dof : 2 * dof], mean[2 * dof :]
-        # A link that sticks stays so while the update leaves it at rest; otherwise its speed decides.
-        pushed = jnp.abs(jnp.sum(rows * (v - motion.v)[None, :], 1))
-        still = (motion.mode == 0) & (pushed <= nothing)
-        v = v - stopping(minv, rows, jnp.sum(rows * v[None, :], 1), still)
-        motion = Motion(x, v, settle(plant, x, z), mode_at(plant, minv, x, v, z, g[0], time, still))
-        past = remember(past, x, v)
-        after = advance_sample(plant, minv, motion, g, base, time, dt)
-        x, v, z = ((a + b) / 2 for a, b in zip(motion[:3], after[:3], strict=True))
-        free, rates = linearised(plant, minv, x, v, z, g[g.shape[0] // 2], time + dt / 2)
-        step = _transition(plant, minv, motion, after, rates, dt, fine.substeps)
-        moving = _product(_product(step, updated), step.T) + added
-        slope = with_friction(plant, minv, x, v, motion.mode, free, time + dt / 2)[0]
-        overrun = _overrun(plant, motion, after, moving, slope, dt)
-        keep = valid > 0
-        onward = (after, past, _rest(plant, minv, moving, after.mode), overrun)
-        return jax.tree.map(lambda new, old: jnp.where(keep, new, old), onward, carry), found
-
-    motion, past = begin(plant, minv, start.x, start.v, fine)
-    before = tuple(drive_before(fine, tau) for tau in plant.channel_delay)
-    inputs = (fine.force, fine.base, fine.time, readings.values, readings.use, readings.valid, before)
-    carry = (motion, past, start.covariance, jnp.full(len(rows), _FAR))
-    loop = one_kernel_scan if one_kernel and size <= _FEW and plant.elementary else jax.lax.scan
-    return loop(body, carry, inputs)[1]
+    base, time = sample.base, sample.time
+    g = load_of(plant, minv, motion, past, drive.force, base, time, dt)
+    mean, updated, found = _update(
+        plant, minv, show, motion, state.covariance, state.overrun, Load(g[:3], base[:3], time, dt / substeps),
+        drive.before, sample.values, sample.use, variances, nothing,
+    )  # fmt: skip
+    x, v, z = mean[:dof], mean[dof : 2 * dof], mean[2 * dof :]
+    # A link that sticks stays so while the update leaves it at rest; otherwise its speed decides.
+    pushed = jnp.abs(jnp.sum(rows * (v - motion.v)[None, :], 1))
+    still = (motion.mode == 0) & (pushed <= nothing)
+    v = v - stopping(minv, rows, jnp.sum(rows * v[None, :], 1), still)
+    motion = Motion(x, v, settle(plant, x, z), mode_at(plant, minv, x, v, z, g[0], time, still))
+    past = remember(past, x, v)
+    after = advance_sample(plant, minv, motion, g, base, time, dt)
+    x, v, z = ((a + b) / 2 for a, b in zip(motion[:3], after[:3], strict=True))
+    free, rates = linearised(plant, minv, x, v, z, g[g.shape[0] // 2], time + dt / 2)
+    step = _transition(plant, minv, motion, after, rates, dt, substeps)
+    moving = _product(_product(step, updated), step.T) + added
+    slope = with_friction(plant, minv, x, v, motion.mode, free, time + dt / 2)[0]
+    overrun, keep = _overrun(plant, motion, after, moving, slope, dt), sample.valid > 0
+    covariance = _rest(plant, minv, moving, after.mode)
+    onward = State(*after[:3], after.mode.astype(int), past, covariance, overrun)
+    return jax.tree.map(lambda new, old: jnp.where(keep, new, old), onward, state), found
 
 
 def _transition(plant, minv, before: Motion, after: Motion, rates, dt, substeps: int):

@@ -13,8 +13,6 @@ LADDER = (1.0, 0.3, 0.1, 0.03, 0.01)
 """Shares of unmodelled force that the first rungs forgive: the top ones compare forces and have wide basins."""
 _LAST_RUNG = 0.003
 _RUNG_STEPS, _LAST_RUNG_STEPS, _RUNG_ENOUGH = 3, 10, 0.5
-_RUNG_SAMPLES = 4096
-"""Samples of a record, its first ones, that the rungs use: they only lead to a basin."""
 _ENOUGH = 0.01
 """A step that promises less than this many nats is the last,"""
 _HOPELESS = 0.02
@@ -62,10 +60,10 @@ def rungs(posterior: Posterior, ladder: Sequence[float] = LADDER, theta: np.ndar
     """What `approach` stands on after each rung."""
     theta = posterior.initial() if theta is None else theta
     for share in ladder[:-1]:
-        found = _climb(posterior, theta, share, _RUNG_STEPS, _RUNG_ENOUGH, most=_RUNG_SAMPLES)
+        found = _climb(posterior, theta, share, _RUNG_STEPS, _RUNG_ENOUGH, first=True)
         yield found
         theta = found.theta
-    yield _climb(posterior, theta, ladder[-1], _LAST_RUNG_STEPS, _RUNG_ENOUGH, most=_RUNG_SAMPLES)
+    yield _climb(posterior, theta, ladder[-1], _LAST_RUNG_STEPS, _RUNG_ENOUGH, first=True)
 
 
 def finish(posterior: Posterior, start: Maximum, steps: int = 25, best: float = np.inf) -> Maximum:
@@ -119,7 +117,7 @@ def _climb(
     steps: int,
     enough: float,
     best: float = np.inf,
-    most: int | None = None,
+    first: bool = False,
 ) -> Maximum:
     """The top from `theta` by damped steps.
 
@@ -131,7 +129,7 @@ def _climb(
     high = np.array([[u.high for u in row] for row in unknowns])
     log = np.array([[u.log or u.path.startswith("noise@") for u in row] for row in unknowns])
     lanes = theta.shape[0]
-    here = _Place(theta, *_finite(posterior.evaluate(theta, slack, most)))
+    here = _Place(theta, *_finite(posterior.evaluate(theta, slack, first)))
     beyond, astray = here, np.zeros(lanes, bool)
     damp = np.full(lanes, 1e-3)
     open_, results = np.ones(lanes, bool), [Result.maximum_steps] * lanes
@@ -152,7 +150,7 @@ def _climb(
         if not np.any(open_) or (step >= last and not np.any(open_ & (here.value < reached))):
             break
         trial = np.where(open_[:, None], start.theta + move, here.theta)
-        there = _Place(trial, *_finite(posterior.evaluate(trial, slack, most)))
+        there = _Place(trial, *_finite(posterior.evaluate(trial, slack, first)))
         better = open_ & (there.value < here.value)
         failed = open_ & ~better & (astray | (damp >= _WALL) | ~np.isfinite(there.value))
         astray = open_ & ~better & ~failed

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -42,6 +43,10 @@ _SAME = 1e-9
 """Rounding, relative."""
 _STOPPED = 1 / 3
 """Share of the time in which damping stops a motion, where nothing is elastic, that counts as a period."""
+_LEADING = 4096
+"""Readings, the first ones, that lead to a basin,"""
+_LOUD = 0.25
+"""where their power is such a share of that of all, at least."""
 _STRETCH = 0.25
 """Share of a channel's samples, one after the other, that are enough to read its noise from."""
 
@@ -128,6 +133,16 @@ class Nuisances:
     def judged(self) -> np.ndarray:
         """Which of the channels a hypothesis has to predict."""
         return np.array([channel in self.record.answers for channel in self.channels])
+
+    @cached_property
+    def leading(self) -> int:
+        """Readings that lead to a basin: the first ones, more of them where the record is quiet at first."""
+        values, used = (np.asarray(a)[: self.samples] for a in (self.readings.values, self.readings.use))
+        power = np.cumsum(np.sum(used * ((values - values.mean(0)) / self.spread) ** 2, 1))
+        count = _LEADING
+        while count < self.samples and power[count - 1] / count < _LOUD * power[-1] / self.samples:
+            count *= 2
+        return min(count, self.samples)
 
     def elastic_force(self, structure: Structure) -> float:
         """Size of the elastic force, or of the measured one where the motion is imposed."""

@@ -85,25 +85,25 @@ class Posterior:
         return np.array([[u.theta for u in unknowns] for unknowns in self.hypothesis.unknowns])
 
     def evaluate(
-        self, theta: np.ndarray, slack: float = 0.0, most: int | None = None
+        self, theta: np.ndarray, slack: float = 0.0, first: bool = False
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Minus log-posterior (lanes,), gradient and information.
 
-        `slack` is the share of unmodelled force forgiven, no less than the record's own; of every record at most `most`
-        samples count.
+        `slack` is the share of unmodelled force forgiven, no less than the record's own; of every record only its
+        `first` readings count, as many as lead to a basin, where these are asked for.
         """
-        return self._evaluate(theta, slack, most)[:3]
+        return self._evaluate(theta, slack, first)[:3]
 
     def scatter(self, theta: np.ndarray) -> np.ndarray:
         """Covariance (lanes, unknowns, unknowns) of the gradient as the record itself shows it, from its stretches."""
         return self._evaluate(theta)[3]
 
-    def _evaluate(self, theta: np.ndarray, slack: float = 0.0, most: int | None = None):
+    def _evaluate(self, theta: np.ndarray, slack: float = 0.0, first: bool = False):
         lanes, size = theta.shape
         value, gradient, information = np.zeros(lanes), np.zeros((lanes, size)), np.zeros((lanes, size, size))
         scatter = np.zeros_like(information)
         for nuisances, end, (plant, maps, mine) in zip(self.records, self.until, self._parts, strict=True):
-            until = end if most is None else min(end, most)
+            until = min(end, nuisances.leading) if first else end
             width = maps.unit.shape[1]
             inner = np.zeros((len(self._pick), width))
             inner[:, : len(mine)] = theta[self._pick][:, mine]

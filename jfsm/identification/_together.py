@@ -17,7 +17,7 @@ from ._starts import CORRELATED, Regression, of_size, one_sign, shapes_of
 _APART = 1e-3
 """Share of a shape's power that another does not make, below which the two are one."""
 _ENOUGH = 3000
-"""Samples of a missing force, of more than which only some count."""
+"""Readings of a missing force, of more than which only some samples count."""
 
 
 class PlacedTogether(NamedTuple):
@@ -71,7 +71,7 @@ def place_together(
     if regression is None or not pairs:
         return []
     samples, dof = regression.missing.shape
-    every = -(-samples // _ENOUGH)
+    every = -(-samples * dof // _ENOUGH)
     kept = np.repeat(np.arange(samples) % every == 0, dof)
     basis, wanted = regression.basis[kept], regression.wanted[kept]
     shapes = {i: one._replace(forces=one.forces[:, kept]) for i, one in shapes.items()}
