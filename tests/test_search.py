@@ -22,7 +22,7 @@ from jfsm.diagnosis._effect import Effect
 from jfsm.diagnosis._pairs import crossed, instead, pairs
 from jfsm.diagnosis._problem import Problem
 from jfsm.diagnosis._score import Replaced, gains
-from jfsm.diagnosis._search import Found, LeftBehind, fit_model, refit_from, search, search_akin, search_pairs
+from jfsm.diagnosis._search import Found, LeftBehind, fit_model, groups, refit_from, search, search_akin, search_pairs
 from jfsm.identification import prepare
 from jfsm.structures import Coulomb, SineStiffness, SmoothCoulomb, Stribeck, causes
 
@@ -55,6 +55,28 @@ def test_an_early_channel_is_a_late_other_one():
     assert late_instead(jfsm.ForceDelay(0.04, at=("force", 1)), begin, [force, channel], MODEL) == []
     other = delay("channel_delay", ("acceleration", 1))
     assert late_instead(early, begin, [force, channel, other], MODEL) == []
+
+
+def test_starts_climb_side_by_side_only_with_as_many_unknowns():
+    chain = jfsm.Structure.chain(mass=[1.0, 1.0], stiffness=[9.0, 9.0], damping=[0.3, 0.3])
+    time = np.arange(200) * 0.1
+    force = np.stack([np.sin(time) + np.cos(2.3 * time), np.zeros(200)], 1)
+    noisy = np.random.default_rng(0).standard_normal((200, 2))
+    record = prepare(jfsm.Record(time, force, displacement=noisy), chain)
+    problem = Problem(chain, [record], [200])
+    lots = []
+    for cause, law in (
+        ("preload", jfsm.Preload(0.1, at=(0, 1))),
+        ("cubic_hardening", jfsm.CubicStiffness(1.0, at=(0, 1))),
+    ):
+        terms = [replace(law, at=at) for at in ((0, 1), (1, 2))]
+        tried = [Candidate((Effect(causes()[cause], term.at),), (chain + term,)) for term in terms]
+        lots.append(groups(tried, None, problem))
+        for lot in lots[-1]:
+            posed = hypothesis(chain, [start for _, start, _ in lot], [record])
+            assert len({len(unknowns) for unknowns in posed.unknowns}) == 1
+    # A constant force between ground and a driven mass is an offset of its force sensor by another name.
+    assert [len(each) for each in lots] == [2, 1]
 
 
 def rubbing(static: float) -> Problem:

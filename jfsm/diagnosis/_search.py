@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .._threads import compiled_once, side_by_side
-from ..identification import LADDER, LANES, Maximum, Posterior, approach, finish, lanes_of, rungs
+from ..identification import LADDER, LANES, Maximum, Posterior, approach, finish, lanes_of, rungs, with_offsets
 from ..structures import Structure
 from ._adequacy import GATE, SIGNIFICANT, adequate, explained
 from ._akin import general_cases, late_instead, resting, special_cases
@@ -165,8 +165,10 @@ def refit_from(beside: Sequence[Trial], refitted: Trial, problem: Problem) -> Tr
     return again if again.evidence > refitted.evidence else refitted
 
 
-def groups(tried: Sequence[Candidate], own: Begin | None) -> list[list[Beginning]]:
+def groups(tried: Sequence[Candidate], own: Begin | None, problem: Problem) -> list[list[Beginning]]:
     """Starts that can share a program, in lots of its lanes: one law, whatever its sign and place.
+
+    A constant force leaves the offset of a force sensor no room where one measures there, and fewer unknowns.
 
     A law starts twice, from the own values as given and from those of the refit: either may be far from what is right
     beside it. A gain lies on a ridge with the own values, and only a climb from those as given ends at its own end.
@@ -177,7 +179,8 @@ def groups(tried: Sequence[Candidate], own: Begin | None) -> list[list[Beginning
         gain = all(effect.cause.is_sensor for effect in candidate.effects)
         begins = [candidate.begin] if candidate.begin or gain or own is None else [None, own]
         alone = lanes_of(candidate.starts[0]) == 1  # all starts of one candidate then, of which one climbs
-        law = tuple(effect.cause.effect for effect in candidate.effects)
+        offsets = len(with_offsets(candidate.starts[0], problem.records).sensors)
+        law = offsets, *(effect.cause.effect for effect in candidate.effects)
         lot = by_law.setdefault((law, candidate if alone else None), [])
         lot += [(candidate, s, begin) for begin in begins for s in candidate.starts]
     for (_, alone), lot in by_law.items():
@@ -195,7 +198,7 @@ def search(
 ) -> Found:
     """Every candidate fitted, those far behind only so far."""
     own = own_part(found_in(refitted)) if refitted.evidence > given.evidence else None
-    lots = [_Lot(beginnings, problem, _ALONE.ladder) for beginnings in groups(tried, own)]
+    lots = [_Lot(beginnings, problem, _ALONE.ladder) for beginnings in groups(tried, own, problem)]
     most = sorted((candidate.share or 0.0 for candidate in tried), reverse=True)[:_PROMISING]
     kept = [lot for lot in lots if lot.share > 0 and lot.share >= most[-1]]
     return _climbed(lots, _ALONE, kept, refitted, tell)
@@ -242,7 +245,7 @@ def search_again(told: Sequence[Trial], refitted: Trial, problem: Problem, tell:
     parts = {(effect,) for effects in best if len(effects) > 1 for effect in effects}
     best |= {t.effects: t for t in told if t.effects in parts}
     tried = [_as_candidate(t, problem.model) for t in best.values()]
-    lots = [_Lot(beginnings, problem, _FROM_THERE.ladder) for beginnings in groups(tried, None)]
+    lots = [_Lot(beginnings, problem, _FROM_THERE.ladder) for beginnings in groups(tried, None, problem)]
     return _climbed(lots, _FROM_THERE._replace(to_the_end=True), lots, refitted, tell)
 
 
@@ -260,7 +263,7 @@ def _from_there(tried: Sequence[Candidate], known: Found, problem: Problem, tell
     """What is known already, and candidates that begin from numbers that were found."""
     if not tried:
         return known
-    lots = [_Lot(beginnings, problem, _FROM_THERE.ladder) for beginnings in groups(tried, None)]
+    lots = [_Lot(beginnings, problem, _FROM_THERE.ladder) for beginnings in groups(tried, None, problem)]
     best = min(known.trials, key=lambda t: t.value)
     return known.and_then(_climbed(lots, _FROM_THERE, [], best, tell))
 
@@ -280,7 +283,7 @@ def search_pairs(
     best = min([refitted, *singles], key=lambda t: t.value)
 
     def climbed(tried: Sequence[Candidate], way: _Way, kept: list[str] | None = None) -> Found:
-        lots = [_Lot(beginnings, problem, way.ladder) for beginnings in groups(tried, None)]
+        lots = [_Lot(beginnings, problem, way.ladder) for beginnings in groups(tried, None, problem)]
         return _climbed(lots, way, [lot for lot in lots if lot.families == kept], best, tell)
 
     def leading(found: Found) -> Trial:
