@@ -244,9 +244,8 @@ def _transition(plant, minv, before: Motion, after: Motion, rates, dt, substeps:
     held = _held(plant, minv, rates[dof : 2 * dof], (before.mode == 0) & (after.mode == 0))
     halvings = (substeps - 1).bit_length()
     exponent = dt / 2**halvings * jnp.concatenate([rates[:dof], held, rates[2 * dof :]], 0)
-    square = _product(exponent, exponent)
-    cube, fourth = _product(square, exponent), _product(square, square)
-    step = jnp.eye(exponent.shape[0]) + exponent + square / 2 + cube / 6 + fourth / 24
+    one, square = jnp.eye(exponent.shape[0]), _product(exponent, exponent)
+    step = one + exponent + _product(square, one / 2 + exponent / 6 + square / 24)  # to the fourth power
     for _ in range(halvings):
         step = _product(step, step)
     if not hidden:
