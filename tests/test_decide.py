@@ -9,7 +9,7 @@ import pytest
 import jfsm
 from jfsm.diagnosis._clipped import beside_clipping
 from jfsm.diagnosis._decide import Decision, decide, first_alone
-from jfsm.diagnosis._diagnose import _speaks_against
+from jfsm.diagnosis._diagnose import _closes_too_little, _speaks_against
 from jfsm.diagnosis._effect import Effect
 from jfsm.diagnosis._enough import settled, something_left
 from jfsm.diagnosis._gain import Gain
@@ -509,6 +509,21 @@ def test_what_held_out_runs_speak_against_does_not_stand(verdict: str, lasting: 
     gain = Gain(before=1.0, refitted=1.0, after=after, floor=0.01 * after, channels={}, interval=(0.2, 0.6))
     decision = Decision(verdict, winner, {id(winner): 0.9}, {}, {})
     assert bool(_speaks_against(gain, decision, lasting=lasting)) != stands
+
+
+@pytest.mark.parametrize(
+    ("verdict", "left", "high", "half"),
+    [
+        ("cause", 0.01, 0.4, True),
+        ("cause", 0.01, 0.6, False),
+        ("cause", 0.0, 0.4, False),
+        ("unnamed", 0.01, 0.4, False),
+    ],
+)
+def test_a_cause_that_leaves_more_than_noise_and_closes_less_than_half_is_open(verdict, left, high, half):
+    winner = trial(9000.0, left, "coulomb")
+    gain = Gain(before=1.0, refitted=1.0, after=0.7, floor=0.01, channels={}, interval=(0.2, high))
+    assert _closes_too_little(gain, Decision(verdict, winner, {id(winner): 0.9}, {}, {})) == half
 
 
 @pytest.mark.parametrize(

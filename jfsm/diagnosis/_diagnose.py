@@ -212,6 +212,8 @@ def _confirmed(
         decision = decision.refused(against, refitted)
         extended = refitted.extended
         gain, runs = gained(extended)
+    elif gain is not None and _closes_too_little(gain, decision):
+        decision = decision.open()
     if gain is not None and (by_class := decision.by_class()) is not None:
         confirmed, runs_of_it = gained(by_class.winner.extended)
         if confirmed is not None and confirmed.closed >= ALMOST_ALL:
@@ -222,6 +224,15 @@ def _confirmed(
 def _falls_out_of_step(gain: Gain) -> bool:
     """Whether the model, right over some periods, is wrong in the whole run over held-out readings, refitted or not."""
     return min(gain.before, gain.refitted) > _WORSE * max(gain.floor, NEGLIGIBLE)
+
+
+def _closes_too_little(gain: Gain, decision: Decision) -> bool:
+    """Whether a cause that leaves more than noise closes less than half of the error of a run over held-out readings.
+
+    Where it leaves noise only, it is the motion that no run follows for long.
+    """
+    unsettled = decision.verdict == "cause" and bool(decision.winner.effects) and not adequate(decision.winner)
+    return unsettled and gain.closable and gain.interval[1] < GATE
 
 
 def _speaks_against(gain: Gain, decision: Decision, *, lasting: bool = False) -> str:
