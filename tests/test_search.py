@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jfsm
-from jfsm.diagnosis._akin import general_cases, late_instead, special_cases
+from jfsm.diagnosis._akin import instead_of, late_instead, special_cases
 from jfsm.diagnosis._begin import Begin, Start, begun
 from jfsm.diagnosis._candidates import (
     Candidate,
@@ -125,6 +125,27 @@ def test_a_special_case_that_stopped_on_its_way_is_fitted_from_the_law_that_hold
     assert abs(value - 0.8) < 0.05
 
 
+def test_a_law_that_stopped_on_its_way_goes_on_from_where_another_stands_for_it():
+    time, rng = np.arange(1500) * 0.06, np.random.default_rng(0)
+    force = sum(np.cos(omega * time + omega**2) for omega in np.arange(0.7, 4.5, 0.31))
+    late = MODEL + jfsm.DelayedForce(-1.5, 0.6, at=(0, 1))
+    x = jfsm.simulate(late, jfsm.Record(time, force, at_rest=True), solver="grid").displacement
+    noisy = x + 0.3 * np.std(x) * rng.standard_normal(x.shape)
+    record = jfsm.Record(time, force, displacement=noisy, at_rest=True)
+    problem = Problem(MODEL, [prepare(record, MODEL)], [1500])
+    given, refitted = fit_model(problem)
+    delayed, maxwell = (Effect(causes()[name], (0, 1)) for name in ("delayed_force", "maxwell"))
+    astray = Candidate((delayed,), (MODEL + jfsm.DelayedForce(0.5, 2.5, at=(0, 1)),))
+    # To the second order in the delay either is the other: k_M = -2 k, and half the delay.
+    near = Candidate((maxwell,), (MODEL + jfsm.Maxwell(3.0, 0.3, at=(0, 1)),))
+    alone = search([astray, near], given, refitted, problem, tell)
+    stopped = {t.effects: t.evidence for t in alone.trials}
+    found = search_akin([t for t in alone.trials if t.effects == near.effects], [astray, near], alone, problem, tell)
+    (there,) = (t for t in found.trials if t.effects == astray.effects)
+    assert stopped[astray.effects] < stopped[near.effects] < there.evidence - 10.0
+    assert float(there.structure.values()["delayed_force@0-1.tau"]) == pytest.approx(0.6, rel=0.1)
+
+
 @pytest.mark.parametrize(("static", "more"), [(1.0, []), (2.0, ["stribeck"])])
 def test_a_law_is_tried_that_holds_the_one_that_was_found_where_a_score_test_promises_more_of_it(static, more):
     problem = rubbing(static)
@@ -133,9 +154,9 @@ def test_a_law_is_tried_that_holds_the_one_that_was_found_where_a_score_test_pro
     stribeck, coulomb = (next(c for c in every if c.effects[0].cause.id == name) for name in ("stribeck", "coulomb"))
     alone = search([coulomb], given, refitted, problem, tell)
     (friction,) = alone.trials
-    cases = general_cases(friction, friction.laws[0], [stribeck], problem)
+    cases = instead_of(friction, friction.laws[0], [stribeck], {}, problem)
     assert [c.effects[0].cause.id for c in cases] == more
-    assert general_cases(friction, friction.laws[0], [coulomb], problem) == []
+    assert instead_of(friction, friction.laws[0], [coulomb], {}, problem) == []
     if more:
         found = search_akin(alone.trials, every, alone, problem, tell)
         (falling,) = (t for t in found.trials if t.effects == stribeck.effects)

@@ -1,6 +1,6 @@
 """What is akin to a law or a fault that was found, to be fitted from its numbers too."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from ..identification import Nuisances, with_a_rest
@@ -26,20 +26,24 @@ def special_cases(law: AbstractTerm, begin: Begin, among: Sequence[Candidate]) -
     return cases
 
 
-def general_cases(t: Trial, law: AbstractTerm, among: Sequence[Candidate], problem: Problem) -> list[Candidate]:
-    """What a law that was found is a special case of, where a score test promises more of it in the law's place.
+def instead_of(
+    t: Trial, law: AbstractTerm, among: Sequence[Candidate], close: Mapping[Effect, float], problem: Problem
+) -> list[Candidate]:
+    """What a law that was found is a special case of, where a score test promises more of it in the law's place, or the
+    law leaves something; and what comes `close`, where it promises more than the evidence to which that has come.
 
-    Or where the law leaves something. None along an imposed motion, of which there are no innovations.
+    None along an imposed motion, of which there are no innovations.
     """
-    wider = [c.effects[0] for c in among if len(c.effects) == 1 and c.effects[0].at == law.at]
-    wider = [effect for effect in dict.fromkeys(wider) if type(law) in effect.cause.effect.contains]
+    there = dict.fromkeys(c.effects[0] for c in among if len(c.effects) == 1 and c.effects[0].at == law.at)
+    wider = [effect for effect in there if effect in close or type(law) in effect.cause.effect.contains]
     if not wider or problem.imposed:
         return []
     laws = Laws(t.structure.without(law), problem.first)
     placed = [(effect, shapes) for effect in wider if (shapes := laws.placed(effect) + laws.holding(effect, law))]
     cases, begin = [], found_in(t)
     for (effect, _), best in zip(placed, promised(t, law, laws, [s for _, s in placed], problem), strict=True):
-        if best[0][1] > t.evidence + SIGNIFICANT or not adequate(t):
+        more = best[0][1] > close.get(effect, t.evidence) + SIGNIFICANT
+        if more or (effect not in close and not adequate(t)):
             starts = tuple(problem.model + shape.term for shape, _ in best[:SHAPES])
             cases.append(Candidate((effect,), starts, begin=begin))
     return cases

@@ -11,7 +11,7 @@ from .._threads import compiled_once, side_by_side
 from ..identification import LADDER, LANES, Maximum, Posterior, approach, finish, lanes_of, rungs, with_offsets
 from ..structures import Structure
 from ._adequacy import GATE, SIGNIFICANT, adequate, explained
-from ._akin import general_cases, late_instead, resting, special_cases
+from ._akin import instead_of, late_instead, resting, special_cases
 from ._begin import Begin, found_in, own_part
 from ._candidates import Candidate
 from ._effect import Effect, families
@@ -55,6 +55,8 @@ _ALIKE = 20.0
 """Nats behind the best pair up to which effects of others of its families are tried together, too."""
 _FROM_THERE = _Way(LADDER[-1:], 1, 1.0)
 """From numbers of what is akin."""
+_CLOSE = 100.0
+"""Nats behind a law up to which another one may have stopped on its way, and is tried in its place."""
 _AGAIN = 4
 """Single effects, and pairs, of one problem that are fitted in another: the first in evidence, and in prediction."""
 
@@ -211,8 +213,8 @@ def search_akin(
     problem: Problem,
     tell: Tell,
 ) -> Found:
-    """What is akin to laws that come close, special cases and others, and late channels instead of early ones, fitted
-    from their numbers too.
+    """What is akin to laws that come close, special cases and others, what may stand for the likeliest, and late
+    channels instead of early ones, fitted from their numbers too.
 
     From elsewhere they may have stopped on the way, as a law has that is less probable than a special case of it; where
     nothing leaves noise only, than any.
@@ -226,11 +228,19 @@ def search_akin(
         for part in t.parts:
             tried += late_instead(part, begin, effects, problem.model)
     evidence, wider = {t.effects: t.evidence for t in known.trials}, list[Candidate]()
-    for t in sorted(close if any(map(adequate, close)) else known.trials, key=lambda t: -t.evidence):
+    ranked = sorted(close if any(map(adequate, close)) else known.trials, key=lambda t: -t.evidence)
+    for t in ranked:
         done = {c.effects for c in wider}
         behind = [c for c in every if c.effects not in done and evidence.get(c.effects, -math.inf) < t.evidence]
-        wider += [c for law in t.laws for c in general_cases(t, law, behind, problem)]
+        near = _close_to(t, known.trials) if t is ranked[0] else {}
+        wider += [c for law in t.laws for c in instead_of(t, law, behind, near, problem)]
     return _from_there(tried + wider, known, problem, tell)
+
+
+def _close_to(leader: Trial, trials: Sequence[Trial]) -> dict[Effect, float]:
+    """Single effects that come closest to a trial, and their evidence."""
+    close = [t for t in trials if len(t.effects) == 1 and 0 < leader.evidence - t.evidence < _CLOSE]
+    return {t.effects[0]: t.evidence for t in sorted(close, key=lambda t: -t.evidence)[:_AGAIN]}
 
 
 def search_again(told: Sequence[Trial], refitted: Trial, problem: Problem, tell: Tell) -> Found:
