@@ -31,15 +31,17 @@ def places(cause: str, shaken: Nuisances, given=None) -> list[tuple]:
     return [c.effects[0].at for c in candidates(CHAIN, [shaken], chosen_causes([cause]), given)]
 
 
-def test_laws_are_tried_on_every_link_and_a_hung_mass_on_every_mass(shaken):
+def test_laws_are_tried_on_every_link_and_loads_and_hung_masses_on_every_mass(shaken):
     assert places("cubic_hardening", shaken) == [(0, 1), (1, 2)]
-    assert places("attached_oscillator", shaken) == [(0, 1), (0, 2)]
+    for on_masses in ("attached_oscillator", "preload", "periodic_disturbance"):
+        assert places(on_masses, shaken) == [(0, 1), (0, 2)]
 
 
 def test_places_that_are_given_are_the_only_ones(shaken):
     assert places("cubic_hardening", shaken, [(1, 2)]) == [(1, 2)]
     assert places("attached_oscillator", shaken, [(1, 2)]) == []
     assert places("attached_oscillator", shaken, [(0, 2), (1, 2)]) == [(0, 2)]
+    assert places("preload", shaken, [(1, 2)]) == [(1, 2)]
 
 
 def test_the_whole_catalogue_fits_a_chain(shaken):

@@ -143,10 +143,11 @@ def candidates(
 
 
 def _spots(cause: Cause, model: Structure, places: Sequence[tuple] | None) -> list[tuple]:
-    """Where a law may be: on the links, or on the masses if it hangs on one."""
-    if not cause.effect.hangs:
-        return list(model.links if places is None else places)
-    return [(0, j) for j in range(1, model.dof + 1) if places is None or (0, j) in places]
+    """Where a law may be: on the links; on the masses if it hangs on one or loads it from outside."""
+    masses = [(0, j) for j in range(1, model.dof + 1)]
+    if cause.effect.hangs:
+        return [at for at in masses if places is None or at in places]
+    return list(places if places is not None else masses if cause.family == "input" else model.links)
 
 
 def promising(tried: Sequence[Candidate]) -> tuple[list[Candidate], list[Candidate]]:

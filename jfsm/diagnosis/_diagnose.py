@@ -72,7 +72,7 @@ def diagnose(
     key : jax.random.key, optional
         Source of the few draws (the floor of the gain); made at the call when None.
     places : sequence of links, optional
-        Where link laws are tried; the model's links by default.
+        Where laws and loads are tried; by default laws on the model's links, loads on every mass.
     reconstruction : "band-limited", "linear" or "hold"
         The force between its samples: band-limited for whatever was filtered before it was sampled.
     progress : callable, optional
