@@ -5,7 +5,7 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from ._forces import hidden_start
 from ._plant import Plant
@@ -85,27 +85,29 @@ def true_force(
 
 
 class Past(NamedTuple):
-    """Displacement and velocity of the last samples, the latest first, and how many there have been.
+    """Displacement and velocity of the last samples, in a ring, and how many there have been.
 
     Before the start the motion was the starting value. Empty where nothing answers the past.
     """
 
     x: Float[Array, "reach dof"]
     v: Float[Array, "reach dof"]
-    count: Float[Array, ""]
+    count: Int[Array, ""]
 
 
 def no_past(plant: Plant, x0: Float[Array, " dof"]) -> Past:
     """The past of a run that begins at `x0`."""
     reach = plant.reach if len(plant.delayed) else 0
-    return Past(jnp.broadcast_to(x0[None, :], (reach, plant.dof)), jnp.zeros((reach, plant.dof)), jnp.zeros(()))
+    return Past(jnp.broadcast_to(x0[None, :], (reach, plant.dof)), jnp.zeros((reach, plant.dof)), jnp.zeros((), int))
 
 
-def remember(past: Past, x: Float[Array, " dof"], v: Float[Array, " dof"]) -> Past:
-    """The past once another sample has gone by."""
+def remember(past: Past, x: Float[Array, " dof"], v: Float[Array, " dof"], keep: Bool[Array, ""] | bool = True) -> Past:
+    """The past once another sample has gone by, if that is to be kept."""
     if not past.x.size:
         return past
-    return Past(jnp.concatenate([x[None, :], past.x[:-1]]), jnp.concatenate([v[None, :], past.v[:-1]]), past.count + 1)
+    here = past.count % past.x.shape[0]  # only this row changes, so that the others need not be copied
+    x, v = jnp.where(keep, x, past.x[here]), jnp.where(keep, v, past.v[here])
+    return Past(past.x.at[here].set(x), past.v.at[here].set(v), past.count + keep)
 
 
 def delayed_force(plant: Plant, minv, motion: Motion, past: Past, g, time, step) -> Float[Array, "halves dof"]:
@@ -114,26 +116,33 @@ def delayed_force(plant: Plant, minv, motion: Motion, past: Past, g, time, step)
     The past is read by cubic Hermite interpolation between samples. What lies inside the present sample (a delay
     shorter than it) is read off the parabola that the motion begins it with.
     """
-    halves = g.shape[0]
-    x, v = jnp.concatenate([motion.x[None, :], past.x]), jnp.concatenate([motion.v[None, :], past.v])
+    halves, reach = g.shape[0], past.x.shape[0]
     a = acceleration(plant, minv, motion.x, motion.v, motion.z, motion.mode, g[0], time)[0]
     ahead = jnp.linspace(0.0, 1.0, halves)
     slots, total = plant.delayed, jnp.zeros(g.shape)
+
+    def before(k: Int[Array, " halves"], now, ring) -> Float[Array, "halves dof"]:
+        """Values so many samples ago."""
+        return jnp.where((k == 0)[:, None], now[None, :], ring[(past.count - k) % reach])
+
     for i in range(len(slots)):
-        lag = slots.choose(i, lambda law: law.delay) / step - ahead
-        u = lag[:, None] - jnp.arange(x.shape[0])[None, :]  # samples from each node, positive towards the past
-        near, r = jnp.abs(u) < 1.0, jnp.abs(u)
-        value = jnp.where(near, (1.0 + 2.0 * r) * (1.0 - r) ** 2, 0.0)
-        slope = jnp.where(near, -u * (1.0 - r) ** 2 * step, 0.0)
-        early = (lag > past.count)[:, None]
-        inside = (lag < 0)[:, None]
-        s = -lag[:, None] * step
-        start = past.x[-1:, :]
-        d_past = jnp.where(early, start, _blend(value, x) + _blend(slope, v))
-        d_now = motion.x[None, :] + s * motion.v[None, :] + s**2 / 2 * a[None, :]
-        w_now = motion.v[None, :] + s * a[None, :]
-        moved = jnp.where(inside, d_now, d_past)
-        speed = jnp.where(inside, w_now, jnp.where(early, 0.0, _slopes(u, r, near, step, x, v)))
+        lag = slots.choose(i, lambda law: law.delay) / step - ahead  # samples from each node towards the past
+        early, inside = (lag > past.count)[:, None], (lag < 0)[:, None]
+        k = jnp.clip(jnp.floor(lag).astype(int), 0, reach - 1)
+        s = (lag - k)[:, None]
+        (x, x_before), (v, v_before) = (
+            (before(k, now, ring), before(k + 1, now, ring)) for now, ring in ((motion.x, past.x), (motion.v, past.v))
+        )
+        d_past = (1.0 + 2.0 * s) * (1.0 - s) ** 2 * x + (3.0 - 2.0 * s) * s**2 * x_before
+        d_past = d_past + step * s * (1.0 - s) * (s * v_before - (1.0 - s) * v)
+        w_past = 6.0 * s * (1.0 - s) / step * (x - x_before)
+        w_past = w_past + (1.0 - s) * (1.0 - 3.0 * s) * v + s * (3.0 * s - 2.0) * v_before
+        d_past = jnp.where(early, past.x[past.count % reach][None, :], d_past)
+        w_past = jnp.where(early, 0.0, w_past)
+        ago = -lag[:, None] * step
+        d_now = motion.x[None, :] + ago * motion.v[None, :] + ago**2 / 2 * a[None, :]
+        w_now = motion.v[None, :] + ago * a[None, :]
+        moved, speed = jnp.where(inside, d_now, d_past), jnp.where(inside, w_now, w_past)
         d, w = (jnp.sum(slots.direction[i][None, :] * q, 1) for q in (moved, speed))
         force = _late_force(plant, i, d, w, time + ahead * step)
         total = total + force[:, None] * slots.direction[i][None, :]
@@ -158,22 +167,11 @@ def delayed_along(plant: Plant, x, v, time) -> Float[Array, "n dof"]:
     return total
 
 
-def _slopes(u, r, near, step, x, v):
-    # Derivative of the Hermite interpolant by time: u falls by one per sample.
-    value = jnp.where(near, 6.0 * u * (1.0 - r) / step, 0.0)
-    slope = jnp.where(near, (1.0 - r) * (1.0 - 3.0 * r), 0.0)
-    return _blend(value, x) + _blend(slope, v)
-
-
 def _late_force(plant: Plant, slot: int, d, w, times):
     def along(law):
         return jax.vmap(lambda d, w, t: law.force(d, w, (), t))(d, w, times)
 
     return plant.delayed.choose(slot, along)
-
-
-def _blend(weights, nodes):
-    return jnp.sum(weights[:, :, None] * nodes[None, :, :], 1)
 
 
 def load_of(plant: Plant, minv, motion: Motion, past: Past, force, base, time, step) -> Float[Array, "halves dof"]:

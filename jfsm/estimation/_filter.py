@@ -222,17 +222,21 @@ def one_sample(
     still = (motion.mode == 0) & (pushed <= nothing)
     v = v - stopping(minv, rows, jnp.sum(rows * v[None, :], 1), still)
     motion = Motion(x, v, settle(plant, x, z), mode_at(plant, minv, x, v, z, g[0], time, still))
-    past = remember(past, x, v)
+    keep = sample.valid > 0
+    past = remember(past, x, v, keep)
     after = advance_sample(plant, minv, motion, g, base, time, dt)
     x, v, z = ((a + b) / 2 for a, b in zip(motion[:3], after[:3], strict=True))
     free, rates = linearised(plant, minv, x, v, z, g[g.shape[0] // 2], time + dt / 2)
     step = _transition(plant, minv, motion, after, rates, dt, substeps)
     moving = _product(_product(step, updated), step.T) + added
     slope = with_friction(plant, minv, x, v, motion.mode, free, time + dt / 2)[0]
-    overrun, keep = _overrun(plant, motion, after, moving, slope, dt), sample.valid > 0
+    overrun = _overrun(plant, motion, after, moving, slope, dt)
     covariance = _rest(plant, minv, moving, after.mode)
     onward = State(*after[:3], after.mode.astype(int), past, covariance, overrun)
-    return jax.tree.map(lambda new, old: jnp.where(keep, new, old), onward, state), found
+    onward = jax.tree.map(
+        lambda new, old: jnp.where(keep, new, old), onward._replace(past=None), state._replace(past=None)
+    )
+    return onward._replace(past=past), found
 
 
 def _transition(plant, minv, before: Motion, after: Motion, rates, dt, substeps: int):
