@@ -42,8 +42,9 @@ def instead_of(
     placed = [(effect, shapes) for effect in wider if (shapes := laws.placed(effect) + laws.holding(effect, law))]
     cases, begin = [], found_in(t)
     for (effect, _), best in zip(placed, promised(t, law, laws, [s for _, s in placed], problem), strict=True):
-        more = best[0][1] > close.get(effect, t.evidence) + SIGNIFICANT
-        if more or (effect not in close and not adequate(t)):
+        # What comes close has been at a top of its own: to promise more than that, before its numbers move, is much.
+        least = close.get(effect, t.evidence + SIGNIFICANT)
+        if best[0][1] > least or (effect not in close and not adequate(t)):
             starts = tuple(problem.model + shape.term for shape, _ in best[:SHAPES])
             cases.append(Candidate((effect,), starts, begin=begin))
     return cases
