@@ -330,8 +330,8 @@ def test_a_law_that_is_not_looked_for_gets_no_name_and_a_map_that_runs():
 
 def test_laws_of_a_class_share_one_program(believed, monkeypatch):
     traced = []
-    original = _likelihood._run
-    monkeypatch.setattr(_likelihood, "_run", lambda *a: traced.append(1) or original(*a))
+    original = _likelihood._numbers
+    monkeypatch.setattr(_likelihood, "_numbers", lambda *a: traced.append(1) or original(*a))
     jax.clear_caches()
     jfsm.diagnose(made(duffing), believed, causes=FEW, key=jax.random.key(0))
     assert traced
