@@ -199,7 +199,8 @@ def predict(posterior: Posterior, theta: np.ndarray, slight: bool = False) -> Pr
                 count = np.maximum(mask.sum(0), 1)
                 share = np.clip(found.error / size, -_RUN_AWAY, _RUN_AWAY)
                 errors.append(np.sum(np.sum(np.where(mask, share**2, 0.0), 0) / count))
-                noise = np.sum(np.where(mask, truth.variance, 0.0), 0) / count / size**2
+                doubt = np.clip(truth.variance / size**2, 0.0, _RUN_AWAY**2)
+                noise = np.sum(np.where(mask, doubt, 0.0), 0) / count
                 white = np.minimum(np.asarray(nuisances.readings.variance) / size**2, noise)
                 # Readings err each by itself, a state that was filtered for a whole window: in two directions.
                 pieces = np.maximum(count * nuisances.record.dt / (nuisances.period * PREDICTED), 1.0)
