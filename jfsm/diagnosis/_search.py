@@ -58,7 +58,8 @@ _FROM_THERE = _Way(LADDER[-1:], 1, 1.0)
 _CLOSE = 100.0
 """Nats behind a law up to which another one may have stopped on its way, and is tried in its place."""
 _AGAIN = 4
-"""Single effects, and pairs, of one problem that are fitted in another: the first in evidence, and in prediction."""
+"""Single effects, and pairs, of one problem that are fitted in another: the first in evidence, and in prediction; and
+single effects close to the likeliest that are tried in its place."""
 
 
 class LeftBehind(NamedTuple):
@@ -168,9 +169,8 @@ def refit_from(beside: Sequence[Trial], refitted: Trial, problem: Problem) -> Tr
 
 
 def groups(tried: Sequence[Candidate], own: Begin | None, problem: Problem) -> list[list[Beginning]]:
-    """Starts that can share a program, in lots of its lanes: one law, whatever its sign and place.
-
-    A constant force leaves the offset of a force sensor no room where one measures there, and fewer unknowns.
+    """Starts that can share a program, in lots of its lanes: one law, whatever its sign and place, and as many unknowns,
+    of which a constant force leaves one less where a sensor measures the force.
 
     A law starts twice, from the own values as given and from those of the refit: either may be far from what is right
     beside it. A gain lies on a ridge with the own values, and only a climb from those as given ends at its own end.

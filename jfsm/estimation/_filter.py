@@ -111,7 +111,7 @@ class State(NamedTuple):
     """What a filter carries from sample to sample.
 
     `mode` (slots,) is that of each friction slot, a whole number: it is no function of the plant's numbers. `overrun`
-    (slots,) tells how surely links sample.
+    (slots,) tells how surely links rest.
     """
 
     x: Float[Array, " dof"]
