@@ -169,8 +169,8 @@ def refit_from(beside: Sequence[Trial], refitted: Trial, problem: Problem) -> Tr
 
 
 def groups(tried: Sequence[Candidate], own: Begin | None, problem: Problem) -> list[list[Beginning]]:
-    """Starts that can share a program, in lots of its lanes: one law, whatever its sign and place, and as many unknowns,
-    of which a constant force leaves one less where a sensor measures the force.
+    """Starts that can share a program, in lots of its lanes: one law, whatever its sign and place, and as many
+    unknowns, of which a constant force leaves one less where a sensor measures the force.
 
     A law starts twice, from the own values as given and from those of the refit: either may be far from what is right
     beside it. A gain lies on a ridge with the own values, and only a climb from those as given ends at its own end.
