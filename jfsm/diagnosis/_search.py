@@ -56,7 +56,7 @@ _ALIKE = 20.0
 _FROM_THERE = _Way(LADDER[-1:], 1, 1.0)
 """From numbers of what is akin."""
 _CLOSE = 100.0
-"""Nats behind a law up to which another one may have stopped on its way, and is tried in its place."""
+"""Nats behind a law up to which another one may have stopped on its way, and is tried again."""
 _AGAIN = 4
 """Single effects, and pairs, of one problem that are fitted in another: the first in evidence, and in prediction; and
 single effects close to the likeliest that are tried in its place."""
@@ -247,9 +247,12 @@ def search_again(told: Sequence[Trial], refitted: Trial, problem: Problem, tell:
     """The best that another problem told, as pieces of long records, fitted from there.
 
     These are, of single effects and of pairs, the most probable and those that predict best, and the effects of such
-    pairs one by one.
+    pairs one by one. Once the most probable leaves noise only, those far behind it are not among them.
     """
     ways = (lambda t: -t.evidence, lambda t: float(np.sum(t.prediction.error)))
+    leader = max(told, key=lambda t: t.evidence)
+    if adequate(leader):
+        told = [t for t in told if leader.evidence - t.evidence < _CLOSE]
     alike = [[t for t in told if (len(t.effects) > 1) is many] for many in (False, True)]
     best = {t.effects: t for these in alike for way in ways for t in sorted(these, key=way)[:_AGAIN]}
     parts = {(effect,) for effects in best if len(effects) > 1 for effect in effects}
