@@ -6,6 +6,7 @@ are jitted for their callers' sake: a step asks for the same forces many times o
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ._plant import Plant, hidden_width
@@ -42,6 +43,15 @@ def hidden_rate(plant: Plant, x: State, v: State, z: Hidden, t: Float[Array, ""]
         return _padded(rates - jnp.asarray(law.base) * base if law.base else rates, mine)
 
     return _each(plant, x, v, z, rate)
+
+
+def carried(plant: Plant) -> Float[Array, "hidden dof"]:
+    """Change of the hidden states with that of the velocities where masses are struck: what hangs on one goes along, as
+    it does with the base."""
+    slots, known = plant.memory, np.zeros((len(plant.memory.laws), hidden_width(plant.memory)))
+    for row, law in zip(known, slots.laws, strict=True):
+        row[: len(law.base)] = law.base
+    return (jnp.asarray(known)[slots.kind][:, :, None] * slots.direction[:, None, :]).reshape(plant.hidden, plant.dof)
 
 
 @eqx.filter_jit

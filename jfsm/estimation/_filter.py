@@ -15,7 +15,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from ..dynamics._forces import friction_limits, settle
+from ..dynamics._forces import carried, friction_limits, settle
 from ..dynamics._grid import (
     Fine,
     Past,
@@ -72,7 +72,7 @@ class ProcessNoise(eqx.Module):
     """Covariance (dof, dof) that every sample adds to that of the velocity; of the force, where motion is imposed.
 
     It is the same for all hypotheses: were it to follow a fitted mass or gain, a wrong hypothesis could buy itself
-    noise with it.
+    noise with it. For the same reason a mass that hangs on another is struck with that one.
     """
 
     velocity: Float[Array, "dof dof"]
@@ -207,8 +207,9 @@ def one_sample(
     """State one sample later, and the innovations of this one; `drive` and `sample` are what comes with it."""
     (minv, variances), motion, past = known, state.motion, state.past
     dof, rows = plant.dof, plant.friction.direction
-    size, substeps = 2 * dof + plant.hidden, (drive.force.shape[0] - 1) // 2
-    added = jnp.zeros((size, size)).at[dof : 2 * dof, dof : 2 * dof].set(noise.velocity)
+    substeps = (drive.force.shape[0] - 1) // 2
+    struck = jnp.concatenate([jnp.zeros((dof, dof)), jnp.eye(dof), carried(plant)])
+    added = _product(_product(struck, noise.velocity), struck.T)
     nothing = _NOTHING * jnp.sqrt(jnp.sum(rows[:, :, None] * noise.velocity[None] * rows[:, None, :], (1, 2)))
     base, time = sample.base, sample.time
     g = load_of(plant, minv, motion, past, drive.force, base, time, dt)
