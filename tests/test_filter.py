@@ -13,7 +13,7 @@ import jfsm
 from jfsm.dynamics._excitation import excitation
 from jfsm.dynamics._plant import lower, readout
 from jfsm.estimation import Innovations, ProcessNoise, Readings, Start, innovations
-from jfsm.structures import AccelerationGain, Coulomb, CubicStiffness, DelayedForce, ForceGain, Maxwell, Offset
+from jfsm.structures import AccelerationGain, AttachedOscillator, Coulomb, CubicStiffness, DelayedForce, ForceGain, Maxwell, Offset
 
 N, DT, PADDED = 60, 0.02, 64
 TIME = DT * np.arange(N)
@@ -195,6 +195,18 @@ RUBBING = {"mass": 1.0, "stiffness": 9.0, "damping": 0.05, "F": 0.6}
 RUBBED = jfsm.Structure.sdof(RUBBING["mass"], RUBBING["stiffness"], RUBBING["damping"]) + jfsm.Coulomb(0.6, at=(0, 1))
 STEP, SUBSTEPS = 0.05, 2
 ACCELERATION = (("acceleration", 1),)
+
+
+def test_a_mass_that_is_stiffly_attached_takes_no_share_of_the_process_noise():
+    rigid = jfsm.Structure.chain(mass=[1.0, 0.6], stiffness=[9.0, 5.0], damping=[0.2, 0.1])
+    apart = jfsm.Structure.chain(mass=[1.0, 0.3], stiffness=[9.0, 5.0], damping=[0.2, 0.1])
+    apart = apart + AttachedOscillator(0.3, omega=100.0, zeta=0.7, at=(0, 2))
+    with_it = np.vstack([np.eye(4), np.eye(4)[[1, 3]]])  # at first it moves with what it hangs on
+    use = np.tile([1.0, 1.0, 0.0], (N, 1))  # an acceleration tells how it pulls
+    one = filtered(rigid, use=use)
+    two = filtered(apart, use=use, covariance=with_it @ START_COVARIANCE @ with_it.T)
+    settled = np.s_[20:N, :2]
+    np.testing.assert_allclose(two.variance[settled], one.variance[settled], rtol=0.01)
 
 
 def rubbing(n: int, force=lambda t: np.zeros(1), x0: float = 0.0) -> np.ndarray:
