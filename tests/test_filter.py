@@ -13,7 +13,16 @@ import jfsm
 from jfsm.dynamics._excitation import excitation
 from jfsm.dynamics._plant import lower, readout
 from jfsm.estimation import Innovations, ProcessNoise, Readings, Start, innovations
-from jfsm.structures import AccelerationGain, AttachedOscillator, Coulomb, CubicStiffness, DelayedForce, ForceGain, Maxwell, Offset
+from jfsm.structures import (
+    AccelerationGain,
+    AttachedOscillator,
+    Coulomb,
+    CubicStiffness,
+    DelayedForce,
+    ForceGain,
+    Maxwell,
+    Offset,
+)
 
 N, DT, PADDED = 60, 0.02, 64
 TIME = DT * np.arange(N)
