@@ -250,8 +250,8 @@ def search_again(told: Sequence[Trial], refitted: Trial, problem: Problem, tell:
     pairs one by one. Once the most probable leaves noise only, those far behind it are not among them.
     """
     ways = (lambda t: -t.evidence, lambda t: float(np.sum(t.prediction.error)))
-    leader = max(told, key=lambda t: t.evidence)
-    if adequate(leader):
+    leader = max(told, key=lambda t: t.evidence, default=None)
+    if leader is not None and adequate(leader):
         told = [t for t in told if leader.evidence - t.evidence < _CLOSE]
     alike = [[t for t in told if (len(t.effects) > 1) is many] for many in (False, True)]
     best = {t.effects: t for these in alike for way in ways for t in sorted(these, key=way)[:_AGAIN]}
