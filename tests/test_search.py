@@ -22,7 +22,17 @@ from jfsm.diagnosis._effect import Effect
 from jfsm.diagnosis._pairs import crossed, instead, pairs
 from jfsm.diagnosis._problem import Problem
 from jfsm.diagnosis._score import Replaced, gains
-from jfsm.diagnosis._search import Found, LeftBehind, fit_model, groups, refit_from, search, search_akin, search_pairs
+from jfsm.diagnosis._search import (
+    Found,
+    LeftBehind,
+    fit_model,
+    groups,
+    refit_from,
+    search,
+    search_again,
+    search_akin,
+    search_pairs,
+)
 from jfsm.identification import prepare
 from jfsm.structures import Coulomb, SineStiffness, SmoothCoulomb, Stribeck, causes
 
@@ -364,3 +374,10 @@ def test_beside_another_effect_an_early_channel_is_a_late_other_one_too(with_fri
     starts = [start.values() for c in found for start in c.starts if late in c.effects]
     assert 0.04 in [values["channel_delay@displacement-1.tau"] for values in starts]
     assert all(values["coulomb@0-1.F"] == 0.8 for values in starts)
+
+
+def test_where_no_law_was_looked_for_none_is_fitted_again():
+    none: Any = SimpleNamespace(rung=0.0, value=0.0)
+    problem: Any = SimpleNamespace(model=None, records=[])
+    found = search_again([], none, problem, lambda *_: None)
+    assert found.trials == [] and found.behind == []
