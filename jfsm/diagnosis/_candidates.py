@@ -44,6 +44,7 @@ from ..structures import (
     Preload,
     Structure,
     causes,
+    is_offset,
 )
 from ._begin import Begin, Start, begun
 from ._effect import Effect
@@ -297,9 +298,7 @@ def own_paths(model: Structure, records: Sequence[Nuisances]) -> tuple[str, ...]
     """
     scaled = any(n.weighs(model) for n in records)
     values = model.values()
-    free = [
-        p for p, (what, _) in model.entries().items() if what.free and values[p] != 0 and not p.startswith("offset@")
-    ]
+    free = [p for p, (what, _) in model.entries().items() if what.free and values[p] != 0 and not is_offset(p)]
     return tuple(p for p in free if scaled or not p.startswith("mass@"))
 
 

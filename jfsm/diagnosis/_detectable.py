@@ -26,7 +26,7 @@ import numpy as np
 
 from .._threads import compiled_once, side_by_side
 from ..identification import Posterior, prior
-from ..structures import Preload, Structure
+from ..structures import Preload, Structure, is_offset
 from ._adequacy import NOTICEABLE, SIGNIFICANT
 from ._candidates import Candidate, modest, own_paths
 from ._effect import Effect
@@ -110,7 +110,7 @@ class _Seen:
         self.unknowns, self.program = posterior.hypothesis.unknowns[0], posterior.program
         own, entries = silence.problem.model.entries(), posterior.hypothesis.structures[0].entries()
         self.own = own_paths(silence.problem.model, silence.problem.records)
-        mine = {path for path in entries if path not in own and not path.startswith("offset@")}
+        mine = {path for path in entries if path not in own and not is_offset(path)}
         self.mine = [k for k, u in enumerate(self.unknowns) if u.path in mine]
         self.path = self.unknowns[self.mine[0]].path
         part = self.path.split(".")[0] + "."

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..identification import Unknown, prior
-from ..structures import AccelerationBias, AccelerationGain, ForceGain, Preload
+from ..structures import AccelerationBias, AccelerationGain, ForceGain, Preload, is_offset
 from ._adequacy import NEGLIGIBLE, SIGNIFICANT, adequate, almost_all, unexplained
 from ._doubt import UNFIT, UNFIT_OF_WHITE
 from ._lack_of_fit import Unfit
@@ -67,7 +67,7 @@ def hidden(trials: Sequence[Trial]) -> tuple[type, ...]:
         return ()
     found: list[type] = [ForceGain, AccelerationGain] if strain(best) > SIGNIFICANT else []
     for kind, effect in (("force", Preload), ("acceleration", AccelerationBias)):
-        offsets = [(u, theta) for u, theta in ended(best) if u.path.startswith(f"offset@{kind}-")]
+        offsets = [(u, theta) for u, theta in ended(best) if is_offset(u.path, kind)]
         found += [effect] if _cost(offsets) > SIGNIFICANT else []
     return tuple(found)
 

@@ -10,6 +10,7 @@ from ..structures import (
     AbstractTerm,
     AccelerationBias,
     CubicStiffness,
+    Offset,
     Preload,
     QuadraticStiffness,
     Structure,
@@ -166,7 +167,7 @@ def _instead_of_an_offset(base: Trial, other: Effect) -> AbstractTerm | Abstract
     """A constant force on a mass, or a bias, that takes over what the offset of its sensor is beside `base`."""
     kind, (first, j) = other.cause.effect, other.at
     channel, sign = {Preload: ("force", -1), AccelerationBias: ("acceleration", 1)}.get(kind, ("", 0))
-    offset = base.structure.values().get(f"offset@{channel}-{j}.b", 0.0)
+    offset = base.structure.values().get(Offset.path(channel, j), 0.0)
     if offset == 0 or (kind is Preload and first != 0):
         return None
     return kind(sign * offset, at=other.at)

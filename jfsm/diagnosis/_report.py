@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..identification import Nuisances
-from ..structures import PARAMETER_CAUSES, Cause, Clipping, Structure, causes
+from ..structures import PARAMETER_CAUSES, Cause, Clipping, Structure, causes, is_offset
 from ._adequacy import NEGLIGIBLE
 from ._between import Difference, differences
 from ._candidates import Candidate
@@ -231,7 +231,7 @@ def _wrong_values(t: Trial, probability: float, model: Structure, units) -> tupl
     found = []
     apart = {one.path for one in differences(t)}
     for k, u in enumerate(t.unknowns):
-        if u.path not in model.entries() or u.path.startswith("offset@") or u.record not in (None, 0):
+        if u.path not in model.entries() or is_offset(u.path) or u.record not in (None, 0):
             continue
         moved, sd = abs(t.theta[k] - u.center), math.sqrt(max(t.covariance[k, k], 0.0))
         kind, place = u.path.split(".")[0].split("@")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..identification import Hypothesis, Maximum, Nuisances, Posterior, Unknown, interval, without_small_offsets
-from ..structures import AbstractSensor, AbstractTerm, Structure
+from ..structures import AbstractSensor, AbstractTerm, Structure, is_offset
 from ._effect import Effect, names, places
 
 FILTERED, PREDICTED = 2.0, 3.0
@@ -136,7 +136,7 @@ class Trial:
         """Numbers of the structure that each record has to itself, by path, and these records; offsets aside."""
         found, entries = dict[str, list[int]](), self.structure.entries()
         for u in self.unknowns:
-            if u.record is not None and u.path in entries and not u.path.startswith("offset@"):
+            if u.record is not None and u.path in entries and not is_offset(u.path):
                 found.setdefault(u.path, []).append(u.record)
         return found
 
@@ -165,7 +165,7 @@ def ended(t: Trial) -> list[tuple[Unknown, float]]:
 
 def own_values(t: Trial) -> list[tuple[Unknown, float]]:
     """The model's own values among a trial's unknowns, and where they ended."""
-    return [(u, theta) for u, theta in ended(t) if math.isfinite(u.degrees) and not u.path.startswith("offset@")]
+    return [(u, theta) for u, theta in ended(t) if math.isfinite(u.degrees) and not is_offset(u.path)]
 
 
 def sets(nuisances: Nuisances, until: int) -> list[np.ndarray]:
@@ -183,7 +183,7 @@ def predict(posterior: Posterior, theta: np.ndarray, slight: bool = False) -> Pr
     With `slight` offsets what would be a cause of its own is not explained by an offset.
     """
     if slight:
-        mine = [u.path.startswith(("offset@force", "offset@acceleration")) for u in posterior.hypothesis.unknowns[0]]
+        mine = [is_offset(u.path, "force", "acceleration") for u in posterior.hypothesis.unknowns[0]]
         theta = np.where(mine, np.clip(theta, -_SLIGHT, _SLIGHT), theta)
     best: list[tuple[float, Prediction]] = []
     for slack in SLACKS:

@@ -11,7 +11,7 @@ from .._threads import side_by_side
 from .._types import require_x64
 from ..dynamics import Reconstruction
 from ..records import Record
-from ..structures import Offset, Structure
+from ..structures import Offset, Structure, is_offset
 from ._maximise import Maximum, approach, finish
 from ._nuisances import Nuisances, prepare_all
 from ._posterior import Hypothesis, Posterior, lanes_of
@@ -196,9 +196,7 @@ def free_paths(model: Structure, records: Sequence[Nuisances], fixed: Sequence[s
         held.update(paths)
     if not any(n.weighs(model) for n in records):
         held.update(model.select("mass"))
-    return tuple(
-        p for p, (what, _) in model.entries().items() if p not in held and what.free and not p.startswith("offset@")
-    )
+    return tuple(p for p, (what, _) in model.entries().items() if p not in held and what.free and not is_offset(p))
 
 
 def without_small_offsets(
@@ -212,7 +210,7 @@ def without_small_offsets(
     """
     first: dict[str, int] = {}
     for k, u in enumerate(unknowns):
-        if u.path.startswith("offset@"):
+        if is_offset(u.path):
             first.setdefault(u.path, k)
     while first:
         sure = {path: abs(theta[k]) / math.sqrt(max(covariance[k, k], 1e-300)) for path, k in first.items()}

@@ -216,7 +216,7 @@ def nuisance_unknowns(structure: Structure, nuisances: Nuisances, index: int) ->
             unit, degrees = size * _OFFSET, DEGREES
         elif kind == "force" and nuisances.path is not None:
             unit = size * _OFFSET_OF_ANSWER
-        path = f"offset@{kind}-{j}.b"
+        path = Offset.path(kind, j)
         found.append(Unknown(path, values[path] / unit, unit, False, 0.0, 1.0, degrees, record=index))
     if not nuisances.at_rest:
         for name, guess, unit in (

@@ -11,6 +11,7 @@ from ._sensors import Clipping as Clipping
 from ._sensors import ForceDelay as ForceDelay
 from ._sensors import ForceGain as ForceGain
 from ._sensors import Offset as Offset
+from ._sensors import is_offset as is_offset
 from ._structure import Structure as Structure
 from ._term import AbstractFriction as AbstractFriction
 from ._term import AbstractTerm as AbstractTerm

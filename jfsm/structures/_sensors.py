@@ -124,5 +124,15 @@ class Offset(AbstractSensor):
     channels = CHANNEL_KINDS
     parameters = (Parameter("b", positive=False, meaning="offset of the channel, in its unit"),)
 
+    @staticmethod
+    def path(kind: str, place: int) -> str:
+        """What a structure calls the offset of a channel."""
+        return f"offset@{kind}-{place}.b"
+
+
+def is_offset(path: str, *kinds: str) -> bool:
+    """Whether a structure's number of that path is the offset of a channel, of any kind or of these."""
+    return path.startswith(tuple(f"offset@{kind}-" for kind in kinds or CHANNEL_KINDS))
+
 
 SENSORS = (ForceGain, AccelerationGain, ForceDelay, ChannelDelay, AccelerationBias, Clipping, Offset)
