@@ -79,6 +79,17 @@ def test_quantisation_bounds_the_floor_from_below():
     assert floor.std >= step / np.sqrt(12.0)
 
 
+@pytest.mark.parametrize("quiet", [0.25, 0.3])
+def test_readings_that_rest_on_a_level_at_the_end_of_a_decay_hide_no_noise(quiet):
+    time, step = np.arange(3000) * DT, 0.05
+    signal = np.exp(-0.1 * time) * np.cos(7.0 * time)
+    noisy = signal + quiet * step * np.random.default_rng(5).standard_normal(time.size)
+    y = step * np.round(noisy / step)
+    moving = np.std((y - signal)[:1000])
+    assert np.mean(y[-1000:] == 0.0) > 0.8
+    assert noise_floor(y, DT).std == pytest.approx(moving, rel=0.2)
+
+
 def test_intensity_is_the_variance_times_the_interval():
     floor = noise_floor(np.random.default_rng(5).standard_normal(500), 0.25)
     assert floor.intensity == pytest.approx(floor.std**2 * 0.25)

@@ -22,6 +22,7 @@ CORE_VARIANCE = 0.7737413035
 # estimates differ by. Two such errors hold the truth in 98 of 100 channels of oscillators, with friction in 95.
 SCATTER, DISAGREEMENT = 1.5, 0.7
 FARTHEST = 0.25  # share of the floor that counts of a disagreement: jumps spoil two estimates, not the third
+STRETCHES, SHORT = 5, 200  # of a digitised channel, and samples that one has at least: at rest it shows no noise
 BANDS = 10  # of the spectrum; where a signal reaches into all but one of them, that one still shows the noise
 
 
@@ -108,11 +109,14 @@ def noise_floor(y: ArrayLike, dt: float) -> NoiseFloor:
     freedom = y.size - parameters
     variance = float(residual @ residual) / freedom
     std = np.sqrt(variance)
+    digitised = quantisation_step(y) / np.sqrt(12.0)
+    stretches = max(1, min(STRETCHES, y.size // SHORT)) if digitised > 0 else 1
     narrowest, middle, _ = sorted(
         (
             std,
-            np.sqrt(y.size / freedom) * _core_std(residual),
-            _core_std(np.diff(y, 6)) / np.sqrt(924.0),  # 924: the sum of the squared binomial coefficients of order 6
+            np.sqrt(y.size / freedom) * _core_std(residual, stretches),
+            # 924: the sum of the squared binomial coefficients of order 6
+            _core_std(np.diff(y, 6), stretches) / np.sqrt(924.0),
         )
     )
     if narrowest < INFLATED * std:
@@ -124,7 +128,7 @@ def noise_floor(y: ArrayLike, dt: float) -> NoiseFloor:
         apart = max(apart, std - _quietest_std(y))
     smooth.flags.writeable = False
     return NoiseFloor(
-        std=float(max(std, quantisation_step(y) / np.sqrt(12.0))),
+        std=float(max(std, digitised)),
         effective_parameters=parameters,
         smooth=smooth,
         explained=explained,
@@ -171,9 +175,13 @@ def _quietest_std(y: NDArray[np.float64]) -> float:
     return float(np.sqrt(min(band.mean() for band in np.array_split(power, BANDS))))
 
 
-def _core_std(sample: NDArray[np.float64]) -> float:
-    """Standard deviation of the normal core of a zero-mean sample, whatever lies in its tails."""
-    size = np.abs(sample)
+def _core_std(sample: NDArray[np.float64], stretches: int = 1) -> float:
+    """Standard deviation of the normal core of a zero-mean sample, whatever lies in its tails; the widest of so many
+    stretches."""
+    return max(_core_of(np.abs(stretch)) for stretch in np.array_split(sample, stretches))
+
+
+def _core_of(size: NDArray[np.float64]) -> float:
     std = float(np.quantile(size, 0.3)) / 0.3853  # 30 % of a normal sample lie within 0.3853 standard deviations
     for _ in range(20):
         core = size[size <= CORE * std]
