@@ -1,21 +1,20 @@
 """The smallest effect that a record would have shown.
 
-It is one that nine of ten records, alike but for their noise, let pass each of two hurdles of a verdict:
+Nine of ten records, alike but for their noise, let it pass each of two hurdles of a verdict:
 
-* its evidence beats that of the refit and that of the model as given by what is significant of one law among many. An
-  effect that is f times as large as in some structure moves the readings by f√J standard deviations more than what is
-  refitted can follow, and gains half the square of so many nats; chance adds a normal deviate before the square is
-  taken. Its numbers cost what they cost in Laplace's evidence: Σ z²/2 + ln |1 + W S W| / 2, z and W being where they
-  stand and how wide they are believed to be beforehand, S the information that the readings hold on them. Own values
-  are free beside an effect; the model as given, where they are not, is ahead of the refit by what they cost, and
-  follows less.
+* at two thirds of its size its evidence beats that of the refit and that of the model as given by what is significant
+  of one law among many. An effect that is f times as large as in some structure moves the readings by f√J standard
+  deviations more than what is refitted can follow, and gains half the square of so many nats; chance adds a normal
+  deviate before the square is taken. Its numbers cost what they cost in Laplace's evidence: Σ z²/2 + ln |1 + W S W| /
+  2, z and W being where they stand and how wide they are believed to be beforehand, S the information that the
+  readings hold on them. Own values are free beside an effect; the model as given, where they are not, is ahead of the
+  refit by what they cost, and follows less.
 * without it the model as given predicts noticeably worse than noise lets it.
 
-Eight of ten or more then pass both. Silence is worth something only if an effect of the stated size seldom keeps
-silent, so one of two would not do; ninety-nine of a hundred would take an effect half as large again, of which fewer
-records could say anything. A third of the size brings a ninth of the nats, which is not significant. The nats are exact
-for a law that is linear in its size, and an estimate for friction and large effects. That the name may stay open
-between laws of several families, as under a single line, is not allowed for.
+At two thirds of the stated size laws of other families explain nearly as much where nats decide, and the name stays
+open; twice as many nats tell them apart. Silence is worth something only if an effect of the stated size seldom goes
+unnamed. A third of the size brings a ninth of the nats, which is hardly significant. The nats are exact for a law that
+is linear in its size, and an estimate for friction and large effects.
 """
 
 import math
@@ -36,6 +35,8 @@ from ._trial import SLACKS, Trial, ended, extent, sets, windows
 
 _SPARED = 1.28
 """Standard deviations of chance that an effect has to spare: nine of ten then pass."""
+_NAMED = 1.5
+"""How many times a size that is likelier than nothing has a name: there laws of other families are nearly as likely."""
 _GONE = 30.0
 """Logarithm of the factor by which an effect is made smaller to see what it does."""
 _FAR, _FARTHEST = 3.0, 10.0
@@ -153,7 +154,7 @@ class _Seen:
         return grown
 
     def factor(self, theta: np.ndarray, information: np.ndarray) -> float:
-        """How many times as large it has to be."""
+        """How many times as large it has to be to be named."""
         if not np.all(np.isfinite(information)):
             return math.inf
         believed, mine, grows = prior(self.unknowns, theta)[2], self.mine, self.grows
@@ -172,8 +173,8 @@ class _Seen:
         # to beat a refit that leaves nothing.
         least = SIGNIFICANT if effect.cause.is_sensor or effect.cause.effect is Preload else UNPREDICTED
         return max(
-            _significant(beside_refit[np.ix_(grows, grows)], 0.0 if effect.cause.is_sensor else least, cost),
-            _significant(beside_given[np.ix_(grows, grows)], least + self.silence.spared, cost),
+            _NAMED * _significant(beside_refit[np.ix_(grows, grows)], 0.0 if effect.cause.is_sensor else least, cost),
+            _NAMED * _significant(beside_given[np.ix_(grows, grows)], least + self.silence.spared, cost),
             _noticeable(self.posterior, theta, self.grown(theta, -_GONE), self.silence.given),
         )
 
