@@ -38,6 +38,7 @@ LOG_SCALE = np.array([0.3, 0.0, -0.5])
 PROCESS = np.array([[2e-5, 1e-5], [1e-5, 7e-5]])
 X0, V0 = np.array([0.2, -0.1]), np.array([0.0, 0.4])
 START_COVARIANCE = np.diag([0.02, 0.03, 0.05, 0.01])
+WANDER = np.array([[1e-4, 1e-6], [3e-5, 2e-6], [2e-3, 1e-5]])
 
 
 def measured() -> tuple[np.ndarray, np.ndarray]:
@@ -48,7 +49,14 @@ def measured() -> tuple[np.ndarray, np.ndarray]:
 
 
 def filtered(
-    model=MODEL, values=None, use=None, length: int = PADDED, x0=X0, covariance=START_COVARIANCE, one_kernel=False
+    model=MODEL,
+    values=None,
+    use=None,
+    length: int = PADDED,
+    x0=X0,
+    covariance=START_COVARIANCE,
+    one_kernel=False,
+    wandering: tuple[int, ...] = (),
 ) -> Innovations:
     force, readings = measured()
     readings = readings if values is None else values
@@ -64,6 +72,8 @@ def filtered(
             jnp.asarray(np.pad(use, fill)),
             jnp.asarray(VARIANCE),
             jnp.asarray(np.arange(length) < N, dtype=jnp.float64),
+            jnp.asarray(WANDER[list(wandering)]),
+            wandering,
         ),
         ProcessNoise(jnp.asarray(PROCESS)),
         Start(jnp.asarray(x0), jnp.asarray(V0), jnp.asarray(covariance)),
@@ -146,6 +156,20 @@ def test_the_innovations_of_a_linear_plant_have_the_likelihood_of_a_dense_normal
     law = multivariate_normal(mean[kept], covariance[np.ix_(kept, kept)])  # pyright: ignore[reportArgumentType]
     expected = law.logpdf(measured()[1].ravel()[kept])
     assert log_likelihood(filtered(use=use), use) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("wandering", [(0,), (2, 1)])
+def test_zeros_that_wander_are_slopes_that_change_at_random(wandering):
+    mean, covariance = dense_law()
+    whole = covariance.reshape(N, 3, N, 3).copy()
+    sample = np.arange(N)
+    since = np.maximum(sample[:, None] - 1 - sample[None, :], 0.0)  # samples for which a change of slope has acted
+    for channel in wandering:
+        begun, changed = WANDER[channel]
+        whole[:, channel, :, channel] += begun * np.outer(sample, sample) + changed * since @ since.T
+    law = multivariate_normal(mean, whole.reshape(3 * N, 3 * N))  # pyright: ignore[reportArgumentType]
+    found = filtered(wandering=wandering)
+    assert log_likelihood(found, ALL) == pytest.approx(law.logpdf(measured()[1].ravel()), rel=1e-6)
 
 
 def test_the_value_of_a_masked_reading_changes_nothing_else():

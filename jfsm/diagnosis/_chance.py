@@ -13,7 +13,7 @@ import numpy as np
 
 from .._threads import side_by_side
 from ..dynamics._grid import Fine
-from ..identification import Nuisances, prepare_all
+from ..identification import Nuisances
 from ..records import Record
 from ..structures import Clipping
 from ._adequacy import adequate, white
@@ -40,9 +40,7 @@ def beside_chance(trials: Sequence[Trial], problem: Problem, key: jax.Array) -> 
 
     def draw(rng: np.random.Generator) -> np.ndarray:
         noisy = [_noisy(*parts, rng) for parts in zip(records, runs, levels, strict=True)]
-        again = problem._replace(
-            records=prepare_all(noisy, model, problem.first.reconstruction, weighed=best.structure)
-        )
+        again = problem.of(noisy, best.structure)
         return predict(again.posterior_of(best), best.theta, slight=not best.effects).error
 
     errors = np.array(list(side_by_side(draw, np.random.default_rng(seeds).spawn(_DRAWS))))

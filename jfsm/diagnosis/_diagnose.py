@@ -29,6 +29,7 @@ from ._residual import residual, stand_in
 from ._study import Searched, Study
 from ._trial import Trial
 from ._untold import in_step, untold
+from ._wandering import steadied
 
 _WORSE = 1.5
 """Error on held-out readings, in errors of the model as given and in those that noise leaves, from which a cause makes
@@ -116,7 +117,7 @@ def diagnose(
     # Shown beside a law is the force that it stands for, with the own values that go with it.
     lacking = refitted.structure if term is None else decision.winner.structure.without(term)
     at = term.at if term is not None and term.at in lacking.links else None
-    missing = residual(lacking, first, fitted, at)
+    missing = residual(lacking, steadied(first), fitted, at)
     silence = Silence(tried.given, refitted, judged)
     steps.next("what would have been seen")
     if decision.verdict in ("consistent", "undecided"):  # silence is worth what would have been heard

@@ -19,6 +19,7 @@ from ..records import Record
 from ..structures import Structure
 from ._holdout import HeldOut
 from ._trial import FILTERED, PREDICTED
+from ._wandering import steady
 
 _LEAD = 50.0
 """Periods, at most, that lead a structure that remembers to what was held out."""
@@ -121,8 +122,8 @@ def measure_gain(
     """Gain on what was held out, and per record the curves behind it (measured, before, after).
 
     `noise` is the standard deviation of each channel's noise; `fitted` tells how long a period is, whether anything
-    holds the structure in place, and what the force does between its samples. Where nothing holds it many short runs
-    take the place of a long one.
+    holds the structure in place, which zeros wander, and what the force does between its samples. Where nothing holds
+    it many short runs take the place of a long one.
     """
     seed = np.random.default_rng(np.asarray(jax.random.key_data(key)).astype(np.uint32).tolist())
     squares: dict[str, dict[tuple, list[float]]] = {
@@ -130,6 +131,7 @@ def measure_gain(
     }
     curves = []
     pieces: list[np.ndarray] = []
+    wandering = [fitted.channels[c] for c in fitted.readings.wandering]
     remembers = any(term.states or term.delay is not None for term in extended(None).terms)
     for part in held:
         models = {"before": given, "refitted": refitted(part.of), "after": extended(part.of)}
@@ -137,16 +139,20 @@ def measure_gain(
         # What remembers shows at no instant: it is led to where a run begins, or would begin relaxed.
         lead = math.ceil(_LEAD * period) if remembers else 0
         record, begin = (part.record[part.begin :], 0) if fitted.drifts else part.led_by(lead)
+        if wandering:  # a run begins as the readings say
+            shown = {c: steady(y) if c in wandering else y for c, y in record.channels.items()}
+            record = remeasured(record, shown, {}, seed)
         stretches = _stretches(record, period) if fitted.drifts else [slice(0, len(record))]
         window = _window(min(s.stop - s.start for s in stretches), period)
         counted = _counted(record, stretches, window, begin)
         run_of = partial(_run, stretches=stretches, window=window, reconstruction=fitted.reconstruction)
         runs = {name: run_of(model, record) for name, model in models.items()}
         left = _noise(partial(run_of, models["after"]), record, counted, runs["after"], noise, seed)
-        pieces += _blocks(record, [runs["before"], runs["after"]], counted, period)
+        off = {name: _off(run, record, counted, wandering) for name, run in runs.items()}
+        pieces += _blocks([off["before"], off["after"]], period)
         for channel, y in record.answers.items():
-            for name, run in runs.items():
-                squares[name].setdefault(channel, []).append(float(np.mean((run[channel][counted] - y[counted]) ** 2)))
+            for name, errors in off.items():
+                squares[name].setdefault(channel, []).append(float(np.mean(errors[channel] ** 2)))
             squares["floor"].setdefault(channel, []).append(left[channel])
             squares["spread"].setdefault(channel, []).append(float(np.var(y[begin:])))
         curves.append({"record": record[begin:], **{name: _from(begin, run) for name, run in runs.items()}})
@@ -175,11 +181,17 @@ def _stretches(record: Record, period: float) -> list[slice]:
     return [slice(*pair) for pair in itertools.pairwise(ends)]
 
 
-def _blocks(
-    record: Record, runs: Sequence[Mapping[tuple, np.ndarray]], counted: np.ndarray, period: float
-) -> list[np.ndarray]:
+def _off(
+    run: Mapping[tuple, np.ndarray], record: Record, counted: np.ndarray, wandering: Sequence[tuple]
+) -> dict[tuple, np.ndarray]:
+    """Errors of a run in the readings that are counted; where a zero wanders, what is slow in them is none."""
+    errors = {channel: (run[channel] - y)[counted] for channel, y in record.answers.items()}
+    return errors | {channel: steady(errors[channel]) for channel in wandering}
+
+
+def _blocks(off: Sequence[Mapping[tuple, np.ndarray]], period: float) -> list[np.ndarray]:
     """Mean square errors (runs, channels) of contiguous blocks of the readings that are counted."""
-    errors = np.stack([[(run[c] - y)[counted] ** 2 for c, y in record.answers.items()] for run in runs])
+    errors = np.stack([[error**2 for error in errors.values()] for errors in off])
     count = int(np.clip(errors.shape[-1] / (_BLOCK * period), _FEWEST, _MOST_BLOCKS))
     return [block.mean(-1) for block in np.array_split(errors, min(count, errors.shape[-1]), axis=-1)]
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..identification import Hypothesis, Nuisances, Posterior, prepare_all
+from ..records import Record
 from ..structures import Structure
 from ._begin import Begin
 from ._candidates import Apart, hypothesis
@@ -34,8 +35,17 @@ class Problem(NamedTuple):
 
     def weighed(self, structure: Structure) -> "Problem":
         """The same, the noise of its forces acting through the masses of another structure."""
-        records = [n.record for n in self.records]
-        return self._replace(records=prepare_all(records, self.model, self.first.reconstruction, weighed=structure))
+        return self.of([n.record for n in self.records], structure)
+
+    def of(self, records: Sequence[Record], weighed: Structure) -> "Problem":
+        """The same of other records of the same channels, seen as those that they stand for."""
+        prepared = prepare_all(records, self.model, self.first.reconstruction, weighed=weighed)
+        wandering = [n.readings.wandering for n in self.records]
+        return self._replace(records=[n.with_wandering(c) for n, c in zip(prepared, wandering, strict=True)])
+
+    def with_wandering(self, channel: int) -> "Problem":
+        """The same, the zero of one more channel wandering."""
+        return self._replace(records=[n.with_wandering((*n.readings.wandering, channel)) for n in self.records])
 
     def posterior(
         self, starts: Sequence[Structure], begins: Sequence[Begin | None] = (), *, refit: bool = True

@@ -27,6 +27,7 @@ from ._search import LeftBehind
 from ._shape import Shape, shape_of
 from ._steady import unsteady
 from ._trial import Trial
+from ._wandering import zeros
 
 _SHOWN = 2000
 """Points of a curve in the report."""
@@ -78,7 +79,13 @@ def assemble(
     }
     between = [] if decision.verdict == "consistent" else differences(winner)
     differ = [_in_each(one, _unit(winner.structure, one.path, units)) for one in between]
-    said = [*(note for n in records for note in n.notes), *how_run(records[0]), *differ, *unsteady(winner, problem)]
+    said = [
+        *(note for n in records for note in n.notes),
+        *how_run(records[0]),
+        *zeros(records[0]),
+        *differ,
+        *unsteady(winner, problem),
+    ]
     notes = tuple(dict.fromkeys(said))
     noise = {f"{kind} {j}": float(s) for n in records[:1] for (kind, j), s in zip(n.channels, n.floor, strict=True)}
     smallest = _detectable(tested.seen, units)

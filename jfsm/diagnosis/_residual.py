@@ -16,6 +16,7 @@ from ..surrogates import RKPM, HermiteTable, tabulate
 from ._problem import Problem
 from ._shown import GRID, shown_map, shown_points
 from ._trial import Trial, predict
+from ._wandering import steadied
 
 _NODES = 2000
 """Points that a map is made of; more of a trajectory are near duplicates."""
@@ -65,7 +66,7 @@ def stand_in(trial: Trial, problem: Problem) -> Trial | None:
 
     Its values stay, and the map is fixed. Held-out samples are its guard against freedom.
     """
-    found = residual(trial.structure, problem.first, problem.until[0])
+    found = residual(trial.structure, steadied(problem.first), problem.until[0])
     table = table_of(found)
     if table is None:
         return None

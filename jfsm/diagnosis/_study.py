@@ -32,6 +32,7 @@ from ._search import (
 )
 from ._trial import Trial
 from ._untold import in_step
+from ._wandering import PLAINLY, SLOWLY, steadied, wandering
 
 _HEAVIER = 0.03
 """Change of a mass, as a share of it, from which its noise is another."""
@@ -85,11 +86,13 @@ class Study:
             problem, given, refitted = _believed(problem)
             if unless_later and _later(refitted, NEGLIGIBLE):
                 return refitted
-            every, found = self._sought(problem, given, refitted, known)
+            problem, every, found = self._sought(problem, given, refitted, known)
         else:
             part, given, refitted = _believed(_problem(parts, self.model, self.reconstruction))
-            every, ahead = self._sought(part, given, refitted, known)
-            problem, given, refitted = _believed(problem, near=refitted)
+            part, every, ahead = self._sought(part, given, refitted, known)
+            for channel in part.first.readings.wandering:
+                problem = problem.with_wandering(channel)
+            problem, given, refitted = _believed(problem, near=ahead.refitted)
             found = self._fitted_again(ahead, given, refitted, problem)
             if unless_later and _later(found.refitted, NEGLIGIBLE):
                 return found.refitted
@@ -101,10 +104,16 @@ class Study:
 
     def _sought(
         self, problem: Problem, given: Trial, refitted: Trial, known: Trial | None
-    ) -> tuple[list[Candidate], Searched]:
-        """What could be tried, and what was found."""
-        every = candidates(self.model, problem.records, self.chosen, self.places)
-        return every, self._searched(every, given, refitted, known, problem)
+    ) -> tuple[Problem, list[Candidate], Searched]:
+        """What could be tried, and what was found; the zeros of channels may turn out to wander."""
+        channel = wandering(refitted, problem, PLAINLY)
+        if channel is None:
+            every = candidates(self.model, [steadied(n) for n in problem.records], self.chosen, self.places)
+            found = self._searched(every, given, refitted, known, problem)
+            if isinstance(found, Searched):
+                return problem, every, found
+            channel = found
+        return self._sought(*_believed(problem.with_wandering(channel), near=refitted), known)
 
     def _fitted_again(self, ahead: Searched, given: Trial, refitted: Trial, problem: Problem) -> Searched:
         """The best of what was found in another problem, as in pieces of long records, fitted from there."""
@@ -136,8 +145,11 @@ class Study:
         refitted: Trial,
         known: Trial | None,
         problem: Problem,
-    ) -> Searched:
-        """Single effects fitted, the promising ones first, and pairs of them where that leaves something."""
+    ) -> Searched | int:
+        """Single effects fitted, the promising ones first, and pairs of them where that leaves something.
+
+        A channel, instead, whose zero turns out to wander beside the single ones.
+        """
         stands_for_the_drive = in_step(problem.records)
 
         def told(trials: Sequence[Trial]) -> list[Trial]:
@@ -164,6 +176,9 @@ class Study:
         behind, refitted = found.behind, refit_from(found.trials, refitted, problem)
         louder, (given, refitted, *trials) = self._amid_noise(given, refitted, found.trials, problem)
         lack, alone = LackOfFit(problem), told([given, refitted, *trials])
+        channel = wandering(max(alone, key=lambda t: t.evidence), problem, SLOWLY)
+        if channel is not None:
+            return channel
         effects = _beside(alone, refitted, every, lack, imposed=problem.imposed) if self.pairs else []
         if effects:
             found = search_pairs(effects, trials, known, refitted, problem, self.tell)

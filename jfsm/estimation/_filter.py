@@ -5,6 +5,13 @@ The state is (x, v, z), z being the hidden states of the laws. Between samples t
 is inverted and many filters run side by side. The mode of friction is uncertain while the speed is smaller than its
 error: an acceleration is then judged under each mode, and the most probable one is used (a max-mixture). Its likelihood
 is that of all modes, each with its probability before the reading.
+
+The zero of a channel may wander. It is a state then, with its slope: white noise twice integrated, as in a smoothing
+spline, which leaves to the structure all that is not slow.
+
+References
+----------
+G. Wahba, J. R. Statist. Soc. B 40 (1978) 364, of the spline.
 """
 
 from collections.abc import Callable
@@ -59,13 +66,16 @@ class Readings(eqx.Module):
     """What a filter sees of a record.
 
     `values` (n, channels), `use` (n, channels) is 1 where a sample may update the state, `variance` (channels,) is
-    the white noise of each channel, `valid` (n,) is false in the padding.
+    the white noise of each channel, `valid` (n,) is false in the padding. The zeros of the channels `wandering` begin
+    with slopes, and change these by as much a sample, of the variances `wander` (wandering, 2).
     """
 
     values: Float[Array, "n channels"]
     use: Float[Array, "n channels"]
     variance: Float[Array, " channels"]
     valid: Float[Array, " n"]
+    wander: Float[Array, "wandering 2"] = eqx.field(default_factory=lambda: jnp.zeros((0, 2)))
+    wandering: tuple[int, ...] = eqx.field(default=(), static=True)
 
 
 class ProcessNoise(eqx.Module):
@@ -111,7 +121,7 @@ class State(NamedTuple):
     """What a filter carries from sample to sample.
 
     `mode` (slots,) is that of each friction slot, a whole number: it is no function of the plant's numbers. `overrun`
-    (slots,) tells how surely links rest.
+    (slots,) tells how surely links rest. `zeros` are those of the wandering channels, each followed by its slope.
     """
 
     x: Float[Array, " dof"]
@@ -121,6 +131,7 @@ class State(NamedTuple):
     past: Past
     covariance: Float[Array, "state state"]
     overrun: Float[Array, " slots"]
+    zeros: Float[Array, " two_wandering"]
 
     @property
     def motion(self) -> Motion:
@@ -128,10 +139,12 @@ class State(NamedTuple):
 
 
 class Known(NamedTuple):
-    """What a run of the filter knows throughout besides the plant: its inverse mass, the channels' noise variances."""
+    """What a run of the filter knows throughout besides the plant: its inverse mass, the channels' noise variances, and
+    how their zeros wander."""
 
     minv: Float[Array, "dof dof"]
     variances: Float[Array, " channels"]
+    wander: Float[Array, "wandering 2"]
 
 
 class Drive(NamedTuple):
@@ -159,9 +172,11 @@ def begun(
     minv = inverse_mass(plant)
     fine = punctual(plant, fine)
     motion, past = begin(plant, minv, start.x, start.v, fine)
-    known = Known(minv, readings.variance * jnp.exp(log_scale))
+    known = Known(minv, readings.variance * jnp.exp(log_scale), readings.wander)
     beyond_doubt = jnp.full(len(plant.friction), _FAR)
-    state = State(*motion[:3], motion.mode.astype(int), past, start.covariance, beyond_doubt)
+    zeros = jnp.zeros(2 * len(readings.wandering))
+    covariance = _beside(start.covariance, _about_slopes(readings.wander[:, 0]))
+    state = State(*motion[:3], motion.mode.astype(int), past, covariance, beyond_doubt, zeros)
     return known, state, Drive(fine.force, tuple(drive_before(fine, tau) for tau in plant.channel_delay))
 
 
@@ -185,9 +200,10 @@ def innovations(
     known, state, drive = begun(plant, fine, readings, start, log_scale)
 
     def body(state, inputs):
-        return one_sample(plant, known, show, noise, fine.step, state, *inputs)
+        return one_sample(plant, known, show, noise, fine.step, readings.wandering, state, *inputs)
 
-    return loop_of(plant, one_kernel)(body, state, (drive, samples_of(fine, readings)))[1]
+    loop = loop_of(plant, readings, one_kernel)
+    return loop(body, state, (drive, samples_of(fine, readings)))[1]
 
 
 def samples_of(fine: Fine, readings: Readings) -> Sample:
@@ -195,17 +211,25 @@ def samples_of(fine: Fine, readings: Readings) -> Sample:
     return Sample(fine.base, fine.time, readings.values, readings.use, readings.valid)
 
 
-def loop_of(plant: Plant, one_kernel: bool) -> Callable[..., Any]:
+def loop_of(plant: Plant, readings: Readings, one_kernel: bool) -> Callable[..., Any]:
     """`jax.lax.scan`, or the one kernel that is asked for, where the filter of this plant can be one."""
-    small = 2 * plant.dof + plant.hidden <= _FEW and plant.elementary
+    small = 2 * plant.dof + plant.hidden + 2 * len(readings.wandering) <= _FEW and plant.elementary
     return one_kernel_scan if one_kernel and small else jax.lax.scan
 
 
 def one_sample(
-    plant: Plant, known: Known, show: Readout, noise: ProcessNoise, dt, state: State, drive: Drive, sample: Sample
+    plant: Plant,
+    known: Known,
+    show: Readout,
+    noise: ProcessNoise,
+    dt,
+    wandering: tuple[int, ...],
+    state: State,
+    drive: Drive,
+    sample: Sample,
 ) -> tuple[State, Innovations]:
     """State one sample later, and the innovations of this one; `drive` and `sample` are what comes with it."""
-    (minv, variances), motion, past = known, state.motion, state.past
+    (minv, variances, wander), motion, past = known, state.motion, state.past
     dof, rows = plant.dof, plant.friction.direction
     substeps = (drive.force.shape[0] - 1) // 2
     struck = jnp.concatenate([jnp.zeros((dof, dof)), jnp.eye(dof), carried(plant)])
@@ -214,10 +238,10 @@ def one_sample(
     base, time = sample.base, sample.time
     g = load_of(plant, minv, motion, past, drive.force, base, time, dt)
     mean, updated, found = _update(
-        plant, minv, show, motion, state.covariance, state.overrun, Load(g[:3], base[:3], time, dt / substeps),
-        drive.before, sample.values, sample.use, variances, nothing,
+        plant, minv, show, motion, state.zeros, wandering, state.covariance, state.overrun,
+        Load(g[:3], base[:3], time, dt / substeps), drive.before, sample.values, sample.use, variances, nothing,
     )  # fmt: skip
-    x, v, z = mean[:dof], mean[dof : 2 * dof], mean[2 * dof :]
+    x, v, z, zeros = jnp.split(mean, [dof, 2 * dof, 2 * dof + plant.hidden])
     # A link that sticks stays so while the update leaves it at rest; otherwise its speed decides.
     pushed = jnp.abs(jnp.sum(rows * (v - motion.v)[None, :], 1))
     still = (motion.mode == 0) & (pushed <= nothing)
@@ -228,16 +252,32 @@ def one_sample(
     after = advance_sample(plant, minv, motion, g, base, time, dt)
     x, v, z = ((a + b) / 2 for a, b in zip(motion[:3], after[:3], strict=True))
     free, rates = linearised(plant, minv, x, v, z, g[g.shape[0] // 2], time + dt / 2)
-    step = _transition(plant, minv, motion, after, rates, dt, substeps)
-    moving = _product(_product(step, updated), step.T) + added
+    onward = _ramps(len(wandering))
+    step = _beside(_transition(plant, minv, motion, after, rates, dt, substeps), onward)
+    moving = _product(_product(step, updated), step.T) + _beside(added, _about_slopes(wander[:, 1]))
     slope = with_friction(plant, minv, x, v, motion.mode, free, time + dt / 2)[0]
     overrun = _overrun(plant, motion, after, moving, slope, dt)
     covariance = _rest(plant, minv, moving, after.mode)
-    onward = State(*after[:3], after.mode.astype(int), past, covariance, overrun)
-    onward = jax.tree.map(
-        lambda new, old: jnp.where(keep, new, old), onward._replace(past=None), state._replace(past=None)
+    later = State(*after[:3], after.mode.astype(int), past, covariance, overrun, jnp.sum(onward * zeros[None, :], 1))
+    later = jax.tree.map(
+        lambda new, old: jnp.where(keep, new, old), later._replace(past=None), state._replace(past=None)
     )
-    return onward._replace(past=past), found
+    return later._replace(past=past), found
+
+
+def _beside(a, b):
+    """Two matrices on one diagonal."""
+    return a if not b.size else jax.scipy.linalg.block_diag(a, b)
+
+
+def _about_slopes(variances):
+    """Covariance of zeros and their slopes where only the slopes are in doubt."""
+    return jnp.diag(jnp.stack([jnp.zeros_like(variances), variances], 1).ravel())
+
+
+def _ramps(count: int):
+    """What a sample makes of zeros that change by their slopes."""
+    return jnp.kron(jnp.eye(count), jnp.array([[1.0, 1.0], [0.0, 1.0]]))
 
 
 def _transition(plant, minv, before: Motion, after: Motion, rates, dt, substeps: int):
@@ -268,7 +308,7 @@ def _rest(plant, minv, covariance, mode):
     slots = plant.friction
     dof = plant.dof
     for i in range(len(slots)):
-        still, hidden = jnp.zeros(dof), jnp.zeros(plant.hidden)
+        still, hidden = jnp.zeros(dof), jnp.zeros(covariance.shape[0] - 2 * dof)
         row = jnp.concatenate([still, slots.direction[i], hidden])
         effect = jnp.concatenate([still, jnp.sum(minv * slots.direction[i][None, :], 1), hidden])
         scale = jnp.sum(row * effect)
@@ -293,28 +333,31 @@ def _overrun(plant, before: Motion, after: Motion, covariance, slope, dt):
 
 
 def _update(
-    plant, minv, show, motion: Motion, covariance, overrun, load: Load, before, y, use, variances, nothing
-) -> tuple[Float[Array, " state"], Float[Array, "state state"], Innovations]:
+    plant, minv, show, motion: Motion, zeros, wandering, covariance, overrun, load: Load, before, y, use, variances,
+    nothing,
+) -> tuple[Float[Array, " state"], Float[Array, "state state"], Innovations]:  # fmt: skip
     """State after the readings of one sample, and their innovations; `overrun` tells how surely links rest, `load` is
     that of the sample's first step, `before` what drove it earlier, and speeds of links up to `nothing` are none."""
-    mean = at_first = jnp.concatenate([motion.x, motion.v, motion.z])
+    at_first = jnp.concatenate([motion.x, motion.v, motion.z])
+    mean, size = jnp.concatenate([at_first, zeros]), at_first.size
     late = [
-        (channel, *_late(plant, minv, show, tau, mean, motion.mode, load, *drive))
+        (channel, *_late(plant, minv, show, tau, at_first, motion.mode, load, *drive))
         for tau, channel, drive in zip(plant.channel_delay, plant.late_channel, before, strict=True)
     ]
     errors, spreads, shares = [], [], []
     for c in range(y.shape[0]):
-        gain = 1.0 + plant.channel_gain[c]
+        gain, of_zeros = 1.0 + plant.channel_gain[c], _of_zeros(wandering, c)
+        reading = y[c] - jnp.sum(of_zeros * mean[size:])
         predicted, row, share = _predict(
-            plant, minv, show, c, mean, covariance, motion.mode, overrun, load, y[c], use[c], variances[c], gain,
-            nothing,
+            plant, minv, show, c, mean[:size], covariance[:size, :size], motion.mode, overrun, load, reading, use[c],
+            variances[c], gain, nothing,
         )  # fmt: skip
         for channel, then, rows in late:  # what other channels have told of the motion by now moves it along its slope
-            predicted = jnp.where(channel == c, then[c] + jnp.sum(rows[c] * (mean - at_first)), predicted)
+            predicted = jnp.where(channel == c, then[c] + jnp.sum(rows[c] * (mean[:size] - at_first)), predicted)
             row = jnp.where(channel == c, rows[c], row)
             share = jnp.where(channel == c, 0.0, share)
-        error = y[c] - gain * predicted - plant.channel_offset[c]
-        row = gain * row
+        error = reading - gain * predicted - plant.channel_offset[c]
+        row = jnp.concatenate([gain * row, of_zeros])
         cross = jnp.sum(covariance * row[None, :], 1)
         spread = jnp.sum(row * cross) + variances[c]
         weight = use[c] * cross / spread
@@ -324,6 +367,11 @@ def _update(
         spreads.append(spread)
         shares.append(share)
     return mean, covariance, Innovations(jnp.stack(errors), jnp.stack(spreads), jnp.stack(shares))
+
+
+def _of_zeros(wandering: tuple[int, ...], channel: int):
+    """How a channel's reading depends on the zeros that wander, and on their slopes."""
+    return jnp.array([part for c in wandering for part in (float(c == channel), 0.0)])
 
 
 def _predict(plant, minv, show, c, mean, covariance, mode, overrun, load: Load, y, use, variance, gain, nothing):

@@ -150,8 +150,8 @@ def _slopes_of_motion(
             def onward(held, state, drive):
                 numbers, known = held
                 after, found = one_sample(
-                    with_vector(plant, numbers), known, show, noise, fine.step, eqx.combine(state, modes),
-                    drive if late else drive._replace(force=force), sample,
+                    with_vector(plant, numbers), known, show, noise, fine.step, readings.wandering,
+                    eqx.combine(state, modes), drive if late else drive._replace(force=force), sample,
                 )  # fmt: skip
                 after, modes_after = eqx.partition(after, eqx.is_inexact_array)
                 return (after, _Seen.of(found)), modes_after
@@ -162,7 +162,7 @@ def _slopes_of_motion(
         state, slopes, modes = carry
         return _each(one, count)(floats, modes, (held, state, drive), (held_slopes, slopes, drive_slopes))
 
-    loop = loop_of(eqx.combine(jax.tree.map(lambda leaf: leaf[0], floats), fixed), one_kernel)
+    loop = loop_of(eqx.combine(jax.tree.map(lambda leaf: leaf[0], floats), fixed), readings, one_kernel)
     inputs = (fine.force, samples_of(fine, readings), _moved(drive, 1, 0), _moved(drive_slopes, 2, 0))
     found, slopes = loop(body, (state, state_slopes, modes), inputs)[1]
     return _moved(found, 0, 1), _moved(slopes, 0, 2)

@@ -154,13 +154,19 @@ class Nuisances:
         """What is imposed, and the readings, cut to the padded length of the first `until` samples."""
         n, r = min(bucket(until), self.fine.time.shape[0]), self.readings
         if n not in self._heads:
-            self._heads[n] = self.fine.head(n), Readings(r.values[:n], r.use[:n], r.variance, r.valid[:n])
+            self._heads[n] = self.fine.head(n), replace(r, values=r.values[:n], use=r.use[:n], valid=r.valid[:n])
         return self._heads[n]
 
     def showing(self, values: np.ndarray) -> "Nuisances":
         """The same record, had its channels shown `values` (n, channels)."""
-        n, r = self.samples, self.readings
-        return replace(self, readings=_padded(values, np.asarray(r.use)[:n], np.asarray(r.variance)))
+        values = np.pad(values, ((0, self.readings.valid.size - len(values)), (0, 0)))
+        return replace(self, readings=replace(self.readings, values=jnp.asarray(values)))
+
+    def with_wandering(self, channels: Sequence[int]) -> "Nuisances":
+        """The same record, the zeros of these channels wandering by up to the size of their readings."""
+        size, n = self.spread[list(channels)], self.samples
+        wander = jnp.asarray(np.stack([(size / n) ** 2, 3 * size**2 / n**3], 1))
+        return replace(self, readings=replace(self.readings, wander=wander, wandering=tuple(channels)))
 
     def pushed(self, force: np.ndarray) -> Fine:
         """What drives the record, and another force (n, dof) as well."""

@@ -261,7 +261,7 @@ def _slot_bucket(structure: Structure) -> int:
 
 def replace_use(readings, use):
     """The readings with another choice of samples that update the state."""
-    return type(readings)(readings.values, jnp.asarray(use) * readings.use, readings.variance, readings.valid)
+    return replace(readings, use=jnp.asarray(use) * readings.use)
 
 
 def slackened(nuisances: Nuisances, share: float) -> ProcessNoise:

@@ -1,0 +1,39 @@
+"""A channel whose zero wanders, on data that SciPy made."""
+
+import jax
+import numpy as np
+import pytest
+from test_diagnose import DAMPING, FEW, MASS, STIFFNESS, duffing, linear, made
+
+import jfsm
+
+RIGHT = jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING)
+
+
+def wandered(record: jfsm.Record, channel: str, share: float) -> jfsm.Record:
+    """The record with a channel that goes off by this share of its size, and comes half of the way back."""
+    kinds = {kind: samples.copy() for (kind, _), samples in record.channels.items()}
+    way = np.sin(0.8 * np.pi * np.linspace(0.0, 1.0, len(record)))
+    kinds[channel] += share * kinds[channel].std() * way
+    return jfsm.Record(record.time, **kinds, at_rest=True)
+
+
+@pytest.mark.parametrize("channel", ["displacement", "acceleration"])
+def test_a_spring_is_named_beside_a_zero_that_wanders(channel):
+    d = jfsm.diagnose(wandered(made(duffing), channel, 0.3), RIGHT, causes=FEW, key=jax.random.key(0))
+    assert [f.cause for f in d.findings] == ["cubic_hardening"] and d.findings[0].probability > 0.9
+    assert any(f"zero of {channel} 1 wanders" in note for note in d.notes)
+    assert d.gain is not None and d.gain.closed > 0.9
+
+
+def test_a_zero_that_wanders_is_no_cause_by_itself():
+    d = jfsm.diagnose(wandered(made(linear), "displacement", 0.3), RIGHT, causes=FEW, key=jax.random.key(0))
+    assert d.verdict == "consistent" and any("zero of displacement 1 wanders" in note for note in d.notes)
+
+
+def test_what_a_law_makes_slow_is_not_taken_for_a_zero():
+    def one_sided(x, v):
+        return linear(x, v) + 1.5 * x**2
+
+    d = jfsm.diagnose(made(one_sided), RIGHT, causes=FEW, key=jax.random.key(0))
+    assert [f.cause for f in d.findings] == ["quadratic_stiffness"] and not any("wanders" in note for note in d.notes)
