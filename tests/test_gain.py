@@ -77,3 +77,16 @@ def test_what_nothing_holds_in_place_is_run_for_some_periods_at_a_time(spring: f
     adrift = np.sqrt(np.mean((whole - np.asarray(held.displacement)) ** 2))
     # The same friction, five per cent too small, in one run of them all: only what a spring holds forgets that.
     assert bool(adrift > 5 * gain.channels["displacement 1"].after) is in_parts
+
+
+def test_a_channel_that_rests_where_it_is_held_out_is_judged_in_its_noise():
+    time, step = np.arange(600) * 0.02, 0.05
+    record = jfsm.Record(time, displacement=step * np.round(np.exp(-time) * np.cos(6.0 * time) / step))
+    model = jfsm.Structure.sdof(1.0, 37.0, 2.0)
+    noise = {("displacement", 1): step / np.sqrt(12.0)}
+    held = [HeldOut(record, 300)]
+    assert np.ptp(record[300:].displacement) == 0.0
+    gain, _ = measure_gain(
+        model, lambda of: model, lambda of: model, held, noise, prepare(record, model), jax.random.key(0)
+    )
+    assert gain.channels["displacement 1"].spread == pytest.approx(step / np.sqrt(12.0)) and np.isfinite(gain.before)

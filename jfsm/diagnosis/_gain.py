@@ -154,7 +154,9 @@ def measure_gain(
             for name, errors in off.items():
                 squares[name].setdefault(channel, []).append(float(np.mean(errors[channel] ** 2)))
             squares["floor"].setdefault(channel, []).append(left[channel])
-            squares["spread"].setdefault(channel, []).append(float(np.var(y[begin:])))
+            # At the end of a decay a digitised channel may show one level only.
+            spread = max(float(np.var(y[begin:])), noise.get(channel, 0.0) ** 2)
+            squares["spread"].setdefault(channel, []).append(spread)
         curves.append({"record": record[begin:], **{name: _from(begin, run) for name, run in runs.items()}})
     rms = {name: {c: math.sqrt(float(np.mean(v))) for c, v in table.items()} for name, table in squares.items()}
     units = held[0].record.units
@@ -168,8 +170,8 @@ def measure_gain(
         name: math.sqrt(float(np.mean([(getattr(c, name) / c.spread) ** 2 for c in channels.values()])))
         for name in ("before", "refitted", "after", "floor")
     }
-    spread = np.array([c.spread for c in channels.values()])
-    interval = _interval(np.mean(np.stack(pieces) / spread**2, -1), total["floor"], seed)
+    spreads = np.array([c.spread for c in channels.values()])
+    interval = _interval(np.mean(np.stack(pieces) / spreads**2, -1), total["floor"], seed)
     return Gain(**total, channels=channels, interval=interval), curves
 
 
