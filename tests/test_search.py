@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jfsm
+from jfsm.diagnosis import _search
 from jfsm.diagnosis._akin import instead_of, late_instead, special_cases
 from jfsm.diagnosis._begin import Begin, Start, begun
 from jfsm.diagnosis._candidates import (
@@ -374,6 +375,35 @@ def test_beside_another_effect_an_early_channel_is_a_late_other_one_too(with_fri
     starts = [start.values() for c in found for start in c.starts if late in c.effects]
     assert 0.04 in [values["channel_delay@displacement-1.tau"] for values in starts]
     assert all(values["coulomb@0-1.F"] == 0.8 for values in starts)
+
+
+def test_starts_that_begin_best_where_more_or_less_is_forgiven_both_climb(monkeypatch):
+    class Start:
+        """One that is the better the more is forgiven, or the less, and ends at its top."""
+
+        def __init__(self, begun, top):
+            self.begun, self.top = begun, top
+
+        def initial(self):
+            return np.zeros((1, 1))
+
+        def evaluate(self, theta, share):
+            return (np.array([self.begun[share]]),)
+
+    starts = [
+        Start({0.03: 2.0, 0.01: 1.0}, -5.0),
+        Start({0.03: 3.0, 0.01: 5.0}, -9.0),
+        Start({0.03: 1.0, 0.01: 3.0}, -4.0),
+    ]
+    monkeypatch.setattr(
+        _search,
+        "rungs",
+        lambda start, ladder: (SimpleNamespace(value=np.array([start.top * share])) for share in (0.1, 1.0)),
+    )
+    lot = object.__new__(_search._Lot)
+    stood = list(lot._climb(starts, ("first", "second", "third"), 1, (0.1, 0.03, 0.01)))  # pyright: ignore
+    assert [float(found.value[0]) for found in stood] == [-0.5, -5.0]
+    assert lot.posterior is starts[0] and lot.candidates == ("first",)
 
 
 def test_where_no_law_was_looked_for_none_is_fitted_again():
