@@ -69,8 +69,9 @@ def test_what_nothing_competes_with_needs_no_other_test(undecided):
     assert Leading.of(args[0], leading.rivals[:1], *args[2:]) is None
 
 
-def explained_by(law, damping: float, cause: str) -> Any:
-    structure = jfsm.Structure.sdof(MASS, STIFFNESS, damping) + law
+def explained_by(law, damping: float, cause: str, mass: float = MASS) -> Any:
+    own = [jfsm.LinearStiffness(STIFFNESS, at=(0, 1)), jfsm.LinearDamping(damping, at=(0, 1))]
+    structure = jfsm.Structure([mass], own) + law
     return SimpleNamespace(structure=structure, laws=(law,), effects=(cause,))
 
 
@@ -85,6 +86,14 @@ def test_a_law_that_is_another_for_its_numbers_is_no_rival_that_a_test_could_tel
     leading = Leading.of(BELIEVED, [other, power, cubic], lambda t: shares[id(t)], nuisances, 300)
     assert leading is not None and leading.rivals == (cubic, other)
     assert Leading.of(BELIEVED, [power, cubic], lambda t: shares[id(t)], nuisances, 300) is None
+
+
+@pytest.mark.parametrize(("exponent", "alike"), [(3.002, True), (2.6, False)])
+def test_laws_of_a_device_without_a_mass_are_compared_as_forces(exponent: float, alike: bool):
+    cubic = explained_by(jfsm.CubicDamping(0.3, at=(0, 1)), DAMPING, "cubic_damping", mass=0.0)
+    power = explained_by(jfsm.PowerDamping(0.3, exponent, at=(0, 1)), DAMPING, "power_damping", mass=0.0)
+    record = jfsm.Record(np.arange(400) * 0.05, np.cos(np.arange(400)), np.sin(0.3 * np.arange(400)))
+    assert same_force(cubic, power, prepare(record, BELIEVED)) is alike
 
 
 def test_damping_that_turns_positive_is_damping_that_grows_beside_less_of_its_own():

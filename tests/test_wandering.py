@@ -1,5 +1,7 @@
 """A channel whose zero wanders, on data that SciPy made."""
 
+from typing import Any
+
 import jax
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ RIGHT = jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING)
 
 def wandered(record: jfsm.Record, channel: str, share: float) -> jfsm.Record:
     """The record with a channel that goes off by this share of its size, and comes half of the way back."""
-    kinds = {kind: samples.copy() for (kind, _), samples in record.channels.items()}
+    kinds: dict[str, Any] = {kind: samples.copy() for (kind, _), samples in record.channels.items()}
     way = np.sin(0.8 * np.pi * np.linspace(0.0, 1.0, len(record)))
     kinds[channel] += share * kinds[channel].std() * way
     return jfsm.Record(record.time, **kinds, at_rest=True)

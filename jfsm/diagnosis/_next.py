@@ -176,8 +176,10 @@ def same_force(one: Trial, other: Trial, nuisances: Nuisances) -> bool:
         each = [jax.vmap(lambda d, w, term=term: term.force(d, w, (), zero))(d, w) for term in terms]
         return np.asarray(sum(each, jnp.zeros(d.shape)))
 
-    per_mass = [force(t.structure.terms) / float(np.ravel(t.structure.mass)[0]) for t in (one, other)]
-    added = force(one.laws) / float(np.ravel(one.structure.mass)[0])
+    # A device without a mass is judged by its force itself.
+    masses = [float(np.ravel(t.structure.mass)[0]) or 1.0 for t in (one, other)]
+    per_mass = [force(t.structure.terms) / mass for t, mass in zip((one, other), masses, strict=True)]
+    added = force(one.laws) / masses[0]
     return _rms(per_mass[0] - per_mass[1]) < _SAME * _rms(added)
 
 
