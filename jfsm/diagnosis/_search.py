@@ -108,12 +108,12 @@ class _Lot:
     def _climb(self, posteriors: Sequence[Posterior], candidates: tuple[Candidate, ...], lanes: int, ladder):
         # Where one climbs alone it is the one that begins best, seen from where not too much is forgiven. How much that
         # is no one knows: the best from two places climb, where these are not the same.
-        chosen = {0}
+        chosen = [0]
         if len(posteriors) > 1:
             begun = [[np.min(p.evaluate(p.initial(), share)[0]) for p in posteriors] for share in ladder[-2:]]
-            chosen = {int(np.argmin(values)) for values in begun}
-        for stands in zip(*(rungs(posteriors[i], ladder) for i in sorted(chosen)), strict=True):
-            found, best = min(zip(stands, sorted(chosen), strict=True), key=lambda one: np.min(one[0].value))
+            chosen = sorted({int(np.argmin(values)) for values in begun})
+        for stands in zip(*(rungs(posteriors[i], ladder) for i in chosen), strict=True):
+            found, best = min(zip(stands, chosen, strict=True), key=lambda one: np.min(one[0].value))
             self.posterior, self.candidates = posteriors[best], candidates[best * lanes :][:lanes]
             yield found
 

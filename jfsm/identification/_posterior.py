@@ -159,7 +159,7 @@ class Posterior:
         if use is not None:
             padded = np.zeros(readings.use.shape)
             padded[: len(use)] = use
-            readings = replace_use(readings, padded)
+            readings = replace(readings, use=jnp.asarray(padded) * readings.use)
         found = predictions(
             plant,
             maps,
@@ -257,11 +257,6 @@ def _slot_bucket(structure: Structure) -> int:
     if count == 0 and (len(plant.friction) or len(plant.memory) or len(plant.delayed) or _is_late(structure)):
         return 0  # in a program of its own anyway
     return 1 if count <= 1 else 2 ** math.ceil(math.log2(count))
-
-
-def replace_use(readings, use):
-    """The readings with another choice of samples that update the state."""
-    return replace(readings, use=jnp.asarray(use) * readings.use)
 
 
 def slackened(nuisances: Nuisances, share: float) -> ProcessNoise:
