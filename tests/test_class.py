@@ -1,14 +1,11 @@
 """The class of a law: what narrow-band motion tells of it."""
 
-from types import SimpleNamespace
-from typing import Any
-
 import pytest
 
 import jfsm
 from jfsm.diagnosis._class import class_of
-from jfsm.diagnosis._diagnosis import Estimate, Finding, Rival
-from jfsm.diagnosis._report import _is_slight, _said
+from jfsm.diagnosis._diagnosis import Finding, Rival
+from jfsm.diagnosis._report import _said
 
 PEAK, SPEED = 2.0, 3.0
 LAWS = {
@@ -92,10 +89,3 @@ def test_where_the_law_is_open_its_class_comes_first(probability: float, kind_pr
         kind_probability,
     )
     assert _said(shown, jfsm.causes()).startswith(f"The model lacks {words}")
-
-
-@pytest.mark.parametrize(("cause", "tau", "slight"), [("channel_delay", -0.004, True), ("force_delay", 0.02, False)])
-def test_a_delay_of_less_than_a_sample_is_slight(cause: str, tau: float, slight: bool):
-    nuisances: Any = SimpleNamespace(record=SimpleNamespace(dt=0.01))
-    found = Finding(cause, "input", ("force", 1), 0.9, {"tau": Estimate(tau, tau - 0.001, tau + 0.001, "s")})
-    assert _is_slight(found, nuisances) is slight

@@ -231,11 +231,11 @@ def test_nothing_wrong_is_consistent_and_a_wrong_value_is_named():
 
 
 def test_a_late_force_is_told_and_its_gain_is_left_to_the_values():
-    late = K * x_at(T - 0.015) + C * v_at(T - 0.015)
+    late = K * x_at(T - 0.03) + C * v_at(T - 0.03)
     looked_for = ["force_delay", "force_gain", "preload", "coulomb_asymmetric", "cubic_damping"]
     d = jfsm.diagnose(on_rig(late), MODEL, causes=looked_for, key=jax.random.key(0))
     assert (d.verdict, d.findings[0].cause) == ("cause", "force_delay")
-    assert abs(d.findings[0].parameters["tau"].value - 0.015) < 0.001
+    assert abs(d.findings[0].parameters["tau"].value - 0.03) < 0.001
     assert {c.cause for c in d.candidates} == {"force_delay", "cubic_damping"}
 
 

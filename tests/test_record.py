@@ -172,6 +172,29 @@ def test_what_is_cut_off_is_noted():
     assert record[:].notes == record.until(9.0).notes == ()
 
 
+def test_a_late_channel_is_put_in_time_and_the_others_stay():
+    late, at = np.sin(2 * np.pi * 3.0 * (T - 0.004)), ("displacement", 2)
+    torn = late.copy()
+    torn[70] = 5.0
+    record = Record(T, force=X, displacement={1: X, 2: torn}, at_rest=True)
+    other = record.aligned({at: 0.004})
+    elsewhere = np.arange(T.size) != 70
+    np.testing.assert_allclose(other.channels[at][elsewhere], X[elsewhere], atol=5e-3)
+    assert other.channels[at][70] == 5.0, "what is torn stays torn"
+    np.testing.assert_array_equal(other.channels["displacement", 1], X)
+    assert other.at_rest and other.notes == ("displacement 2 is read 0.004 s later.",)
+    np.testing.assert_array_equal(record.channels[at], torn)
+
+
+def test_what_cannot_be_put_in_time_is_refused():
+    record = Record(T, displacement=X)
+    with pytest.raises(ValueError, match="`late` names .*velocity.*the record has .*displacement"):
+        record.aligned({("velocity", 1): 0.01})
+    for seconds in (np.nan, 5.0):
+        with pytest.raises(ValueError, match="`late` must be shorter than the record"):
+            record.aligned({("displacement", 1): seconds})
+
+
 def test_a_clock_is_shifted_and_says_so():
     record = Record(T, displacement=X, at_rest=True).shifted(-0.25)
     np.testing.assert_array_equal(record.time, T - 0.25)

@@ -90,6 +90,20 @@ def test_starts_climb_side_by_side_only_with_as_many_unknowns():
     assert [len(each) for each in lots] == [2, 1]
 
 
+def test_only_a_gain_begins_at_own_values_as_given_alone():
+    time = np.arange(200) * 0.1
+    noisy = np.random.default_rng(0).standard_normal(200)
+    problem = Problem(MODEL, [prepare(jfsm.Record(time, np.sin(time), displacement=noisy), MODEL)], [200])
+    own: Begin = {("damping@0-1.c", None): Start(0.1, 0.3)}
+
+    def begins(cause: str, sensor) -> list:
+        (lot,) = groups([Candidate((Effect(causes()[cause], sensor.at),), (MODEL + sensor,))], own, problem)
+        return [begin for _, _, begin in lot]
+
+    assert begins("force_gain", jfsm.ForceGain(0.1, at=("force", 1))) == [None]
+    assert begins("force_delay", jfsm.ForceDelay(0.1, at=("force", 1))) == [None, own]
+
+
 def rubbing(static: float) -> Problem:
     """A record of dry friction that the model lacks, with how much of it is fitted; slowly it is `static` as large."""
     time = np.arange(600) * 0.06

@@ -13,7 +13,7 @@ from ..records import Record
 from ..structures import Cause, Clipping, Structure
 from ._adequacy import ALMOST_ALL, GATE, NEGLIGIBLE, adequate
 from ._between import differences
-from ._candidates import chosen_causes
+from ._candidates import Candidate, chosen_causes
 from ._chance import noise_levels
 from ._clipped import beside_clipping, limited
 from ._decide import Decision, decide, first_alone
@@ -22,6 +22,7 @@ from ._diagnosis import Diagnosis
 from ._forgiving import forgiving
 from ._gain import Gain, StructureOf, measure_gain
 from ._holdout import HeldOut, split
+from ._late import Late, in_time, showing_late, slightly_late
 from ._next import Leading
 from ._problem import Problem
 from ._report import Tested, assemble
@@ -34,6 +35,8 @@ from ._wandering import steadied
 _WORSE = 1.5
 """Error on held-out readings, in errors of the model as given and in those that noise leaves, from which a cause makes
 the model worse."""
+_ROUNDS = 3
+"""Times that a record is looked into, at most, in which channels turn out to be late by less than a sample."""
 Progress = Callable[[str, int, int], None]
 
 
@@ -52,7 +55,8 @@ def diagnose(
     """What `model` gets wrong about `record`, the name of the cause, and the gain of mending it.
 
     Where the motion is imposed (``drive="motion"``) it is judged by the force that was measured. Of the sensors' faults
-    only a late force is looked for then: a gain of the force is that of all own values.
+    only a late force is looked for then: a gain of the force is that of all own values. A channel that is late by less
+    than a sample is no finding: it is put in time, and the verdict is that of the rest.
 
     Parameters
     ----------
@@ -92,7 +96,7 @@ def diagnose(
     if max_causes < 1:
         raise ValueError(f"`max_causes` must be at least 1; got {max_causes}.")
     key = jax.random.key(secrets.randbits(32)) if key is None else key
-    training, held = split(record, holdout)
+    training, _ = split(record, holdout)
     chosen = chosen_causes(causes)
     whole = [whole for whole, _ in training]
     clipped = limited(whole, model) if "clipping" in chosen else []
@@ -103,12 +107,7 @@ def diagnose(
 
     steps.next("the model as given and refitted")
     study = Study(model, chosen, places, reconstruction, key, steps.next, pairs=max_causes > 1)
-    studied = study.of(training, unless_later=isinstance(holdout, float))
-    if isinstance(studied, Trial):  # as much is kept back of the first part
-        training, held = split(record, holdout, first=True)
-        studied = study.of(training, known=studied)
-        assert not isinstance(studied, Trial)
-    problem, every, found = studied
+    problem, every, found, held, late = _looked_into(record, holdout, study)
     steps.next("the verdict, and its gain on held-out readings")
     judged, tried, decision, extended, gain, runs = _concluded(found, problem, clipped, model, stated, held, key)
     first, fitted, refitted = judged.first, judged.until[0], tried.refitted
@@ -124,9 +123,31 @@ def diagnose(
         seen = naturally_detectable(every, silence)
     else:
         seen = detectable(tried.trials, silence)
+    if decision.verdict != "consistent":
+        extended = showing_late(extended, late)
     tested = Tested(tried.trials, tried.behind, tried.left_out, seen, tried.lack.known)
     leading = Leading.of(model, [refitted, *tried.trials], decision.share, first, fitted)
     return assemble(decision, clipped, refitted, tested, judged, extended, missing, gain, runs, leading)
+
+
+def _looked_into(
+    record: Record | Sequence[Record], holdout: float | Record | Sequence[Record] | None, study: Study
+) -> tuple[Problem, list[Candidate], Searched, list[HeldOut], Late]:
+    """What a study makes of the records, and what is held out, with channels in time that are late by less than a
+    sample."""
+    late: Late = {}
+    for _ in range(_ROUNDS):
+        training, held = in_time(*split(record, holdout), late)
+        studied = study.of(training, unless_later=isinstance(holdout, float))
+        if isinstance(studied, Trial):  # as much is kept back of the first part
+            training, held = in_time(*split(record, holdout, first=True), late)
+            studied = study.of(training, known=studied)
+            assert not isinstance(studied, Trial)
+        problem, every, found = studied
+        known, late = late, slightly_late(found.every, late, problem.first.record.dt)
+        if late == known:
+            break
+    return problem, every, found, held, known
 
 
 def _decided(found: Searched, problem: Problem, *, lasting: bool) -> tuple[Problem, Searched, Decision]:

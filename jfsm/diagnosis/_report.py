@@ -197,16 +197,10 @@ def _findings(decision: Decision, trials: list[Trial], model: Structure, nuisanc
     winner, units = decision.winner, nuisances.record.units
     if decision.verdict == "cause" and winner.effects:
         found = [_finding(which, decision, trials, model, nuisances) for which in range(len(winner.effects))]
-        return tuple(sorted(found, key=lambda f: (_is_slight(f, nuisances), -f.probability)))
+        return tuple(sorted(found, key=lambda f: -f.probability))
     if decision.verdict == "parameters":
         return _wrong_values(winner, decision.share(winner), model, units)
     return ()
-
-
-def _is_slight(found: Finding, nuisances: Nuisances) -> bool:
-    """Whether it is a delay of less than a sample, as every sensor may have: what else is found is said before it."""
-    late = found.cause in ("force_delay", "channel_delay")
-    return late and abs(found.parameters["tau"].value) < nuisances.record.dt
 
 
 def _finding(which: int, decision: Decision, trials: list[Trial], model: Structure, nuisances: Nuisances) -> Finding:

@@ -9,7 +9,7 @@ import numpy as np
 
 from .._threads import compiled_once, side_by_side
 from ..identification import LADDER, LANES, Maximum, Posterior, approach, finish, lanes_of, rungs, with_offsets
-from ..structures import Structure
+from ..structures import AccelerationGain, ForceGain, Structure
 from ._adequacy import GATE, SIGNIFICANT, adequate, explained
 from ._akin import instead_of, late_instead, resting, special_cases
 from ._begin import Begin, found_in, own_part
@@ -182,7 +182,7 @@ def groups(tried: Sequence[Candidate], own: Begin | None, problem: Problem) -> l
     by_law: dict[tuple, list[Beginning]] = {}
     lots = []
     for candidate in tried:
-        gain = all(effect.cause.is_sensor for effect in candidate.effects)
+        gain = all(issubclass(effect.cause.effect, ForceGain | AccelerationGain) for effect in candidate.effects)
         begins = [candidate.begin] if candidate.begin or gain or own is None else [None, own]
         alone = lanes_of(candidate.starts[0]) == 1  # all starts of one candidate then, of which one climbs
         offsets = len(with_offsets(candidate.starts[0], problem.records).sensors)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from jfsm.records._advance import advanced
 from jfsm.records._channels import Columns, as_columns, as_single, as_time, frozen
 from jfsm.records._fold import fold
 from jfsm.records._resample import resampled
@@ -280,6 +281,36 @@ class Record:
             raise ValueError(f"`seconds` must be a finite time; it was {seconds}. Pass seconds, as 0.0125.")
         other = self._with(frozen(self._time + seconds), self._columns, self._base_acceleration, at_rest=self._at_rest)
         return other.noted(f"The clock was put {'forward' if seconds >= 0 else 'back'} by {abs(seconds):.9g} s.")
+
+    def aligned(self, late: Mapping[tuple[str, int], float]) -> Self:
+        """The record with channels put right that are late by a known time, with a note.
+
+        Between samples a channel is band-limited. Samples that are clipped or torn stay as they are.
+
+        Parameters
+        ----------
+        late : mapping of (kind, dof) to a time
+            How late these channels are [s]; negative where they are early.
+
+        Raises
+        ------
+        ValueError
+            If the record has no such channel, a time is not finite or not shorter than the record, or time is uneven.
+        """
+        columns = {kind: (dofs, values.copy()) for kind, (dofs, values) in self._columns.items()}
+        for channel, seconds in late.items():
+            if channel not in self.channels:
+                raise ValueError(f"`late` names {channel}; the record has {', '.join(map(str, self.channels))}.")
+            if not abs(seconds) < self.duration:
+                raise ValueError(
+                    f"`late` must be shorter than the record of {self.duration:.6g} s; for {channel} it was {seconds}."
+                )
+            kind, j = channel
+            dofs, values = columns[kind]
+            values[:, list(dofs).index(j)] = advanced(self.channels[channel], seconds / self.dt, self.dt)
+        columns = {kind: (dofs, frozen(values)) for kind, (dofs, values) in columns.items()}
+        other = self._with(self._time, columns, self._base_acceleration, at_rest=self._at_rest)
+        return other.noted(*(f"{kind} {j} is read {seconds:.4g} s later." for (kind, j), seconds in late.items()))
 
     def folded(self, period: int | None = None, *, transient: int = 0) -> "Record":
         """The mean period of a record of periodic excitation: n samples become `period` samples with less noise.

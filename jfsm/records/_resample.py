@@ -53,7 +53,7 @@ def resampled(
         values = values[kept[0] : kept[-1] + 1]
         note = note if uneven else f"Kept as sampled, at {rate:.6g} Hz"
     else:
-        values = _filtered(values, position, rate / source_rate)
+        values = filtered(values, position, rate / source_rate)
     return start + steps / rate, values, note + "."
 
 
@@ -85,7 +85,7 @@ def _even(time: Samples, values: Samples) -> tuple[Samples, float]:
     return CubicSpline(merged, together)(uniform), float(np.max(np.diff(merged)))
 
 
-def _filtered(values: Samples, position: Samples, ratio: float) -> Samples:
+def filtered(values: Samples, position: Samples, ratio: float) -> Samples:
     """Uniform samples at fractional positions, below the lower of both band limits, by a Kaiser-windowed sinc."""
     # The cut-off leaves room for the transition only where something could fold back.
     cutoff = PASSBAND * ratio if ratio < 1.0 else 1.0

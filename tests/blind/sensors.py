@@ -15,7 +15,7 @@ Place: TypeAlias = tuple[str, int]  # kind of channel, degree of freedom
 
 UNITS = {"force": "N", "displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 # How late a channel is, in samples. No delay reaches further back than a record is started early.
-DELAYS = (0.4, 4.0)
+DELAYS = (1.2, 4.0)
 CLIPPED_SHARES = (0.01, 0.1)
 
 
