@@ -4,15 +4,22 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from ..records import Record
+import numpy as np
+
+from ..identification import Nuisances
+from ..records import Record, advanced
 from ..structures import ChannelDelay, ForceDelay, Structure
 from ._adequacy import SIGNIFICANT
 from ._holdout import HeldOut
+from ._problem import Problem
+from ._standing import UNPREDICTED
 from ._trial import Trial
 
 _DELAYS = (ForceDelay, ChannelDelay)
 Late = Mapping[tuple[str, int], float]
 """How late channels are, by (kind, degree of freedom) [s]."""
+_STEP = 0.25
+"""Samples by which a channel is read earlier and later."""
 
 
 def slightly_late(trials: Sequence[Trial], known: Late, dt: float) -> Late:
@@ -22,11 +29,45 @@ def slightly_late(trials: Sequence[Trial], known: Late, dt: float) -> Late:
     """
     best = max(trials, key=lambda t: t.evidence)
     delays = [part for part in best.parts if isinstance(part, _DELAYS)]
+    slight = all(abs(part.tau) < dt for part in delays)
     more = {part.at: known.get(part.at, 0.0) + float(part.tau) for part in delays}
     rest = tuple(effect for effect in best.effects if not issubclass(effect.cause.effect, _DELAYS))
     without = max((t.evidence for t in trials if t.effects == rest), default=-math.inf)
-    slight = all(abs(tau) < dt for tau in more.values())
     return {**known, **more} if delays and slight and best.evidence > without + SIGNIFICANT else known
+
+
+def seems_late(beside: Trial, problem: Problem) -> ChannelDelay | None:
+    """The delay, of less than a sample, of a channel that would have been far likelier beside a trial in time, if any.
+
+    The trial's numbers stay: a parabola through what it is worth a quarter of a sample earlier and later.
+    """
+    if problem.imposed:
+        return None
+    now, found = _cost(beside, problem), dict[tuple[str, int], tuple[float, float]]()
+    for c, channel in enumerate(problem.first.channels):
+        earlier, later = (_cost(beside, _read_later(problem, c, samples)) for samples in (-_STEP, _STEP))
+        slope, curvature = (later - earlier) / 2, later + earlier - 2 * now
+        if curvature > 0 and abs(slope) * _STEP < curvature:
+            found[channel] = slope**2 / (2 * curvature), -slope / curvature * _STEP
+    most = max(found, key=lambda channel: found[channel], default=None)
+    if most is None or found[most][0] < UNPREDICTED:
+        return None
+    return ChannelDelay(found[most][1] * problem.first.record.dt, at=most)
+
+
+def _cost(t: Trial, problem: Problem) -> float:
+    return float(problem.posterior_of(t).evaluate(t.theta[None])[0][0])
+
+
+def _read_later(problem: Problem, c: int, samples: float) -> Problem:
+    """The same problem, a channel of its records read so many samples later."""
+
+    def moved(nuisances: Nuisances) -> Nuisances:
+        values = np.array(nuisances.readings.values)[: nuisances.samples]
+        values[:, c] = advanced(values[:, c], samples, nuisances.record.dt)
+        return nuisances.showing(values)
+
+    return problem._replace(records=[moved(nuisances) for nuisances in problem.records])
 
 
 def in_time(

@@ -98,7 +98,7 @@ def instead(pair: Trial, effects: Sequence[Effect], problem: Problem) -> list[Ca
             found += [one.candidate for one in beside if one.promise is None]
         effect, part = pair.effects[kept], pair.parts[kept]
         for other, late in other_delay(pair.parts[changed], effects):
-            found.append(_joined(problem.model, effect, part, other, [late], found_in(pair)))
+            found.append(joined(problem.model, effect, part, other, [late], found_in(pair)))
         found += [one.candidate for one in _best(beside, _INSTEAD)]
     return [c for c in found if set(c.effects) != set(pair.effects)]
 
@@ -121,7 +121,7 @@ def crossed(found: Sequence[Trial], singles: Sequence[Trial], model: Structure) 
     done, tried = {t.effects for t in found}, list[Candidate]()
     for (one, part), (other, law) in product(places[0].items(), places[1].items()):
         if _ordered(one, other) not in done and _are_two(one, other):
-            tried.append(_joined(model, one, part, other, [law], found_in(best)))
+            tried.append(joined(model, one, part, other, [law], found_in(best)))
     return tried
 
 
@@ -145,7 +145,7 @@ def _beside(base: Trial, kept: int, effects: Sequence[Effect], problem: Problem)
             continue
         constant = _instead_of_an_offset(base, other)
         if constant is not None:
-            found.append(_Pair(_joined(model, effect, part, other, [constant], begin), None))
+            found.append(_Pair(joined(model, effect, part, other, [constant], begin), None))
         elif other.cause.is_sensor:
             # A gain lies on a ridge with the own values: it begins at those as given, and at their end of it.
             starts = natural_starts(model + part, *other, problem.first)
@@ -159,7 +159,7 @@ def _beside(base: Trial, kept: int, effects: Sequence[Effect], problem: Problem)
         terms = [shape.term for shape, _ in best[:SHAPES]] + laws.natural(other)
         shape, most = best[0]
         promise = None if shape.share is None else most
-        found.append(_Pair(_joined(model, effect, part, other, terms[:SHAPES], begin), promise))
+        found.append(_Pair(joined(model, effect, part, other, terms[:SHAPES], begin), promise))
     return found
 
 
@@ -190,7 +190,7 @@ def _ordered(one: Effect, other: Effect) -> tuple[Effect, Effect]:
     return (one, other) if _in_order(one, other) else (other, one)
 
 
-def _joined(
+def joined(
     model: Structure,
     one: Effect,
     part: AbstractTerm | AbstractSensor,

@@ -9,14 +9,14 @@ import numpy as np
 
 from .._threads import compiled_once, side_by_side
 from ..identification import LADDER, LANES, Maximum, Posterior, approach, finish, lanes_of, rungs, with_offsets
-from ..structures import AccelerationGain, ForceGain, Structure
+from ..structures import AbstractSensor, AbstractTerm, AccelerationGain, ForceGain, Structure
 from ._adequacy import GATE, SIGNIFICANT, adequate, explained
 from ._akin import instead_of, late_instead, resting, special_cases
 from ._begin import Begin, found_in, own_part
 from ._candidates import Candidate
 from ._effect import Effect, families
 from ._enough import far_off, is_itself
-from ._pairs import crossed, instead, pairs
+from ._pairs import crossed, instead, joined, pairs
 from ._problem import Problem
 from ._trial import Trial, trial
 
@@ -269,6 +269,14 @@ def search_again(told: Sequence[Trial], refitted: Trial, problem: Problem, tell:
 def search_known(found: Trial, others: Found, problem: Problem, tell: Tell) -> Found:
     """What another part of the records told, fitted from there too."""
     return _from_there([_as_candidate(found, problem.model)], others, problem, tell)
+
+
+def search_beside(
+    alone: Trial, other: Effect, part: AbstractTerm | AbstractSensor, problem: Problem, tell: Tell
+) -> Found:
+    """A single effect, and the same beside another one that begins with these numbers."""
+    pair = joined(problem.model, alone.effects[0], alone.parts[0], other, [part], found_in(alone))
+    return _from_there([pair], Found([alone], []), problem, tell)
 
 
 def _as_candidate(t: Trial, model: Structure) -> Candidate:

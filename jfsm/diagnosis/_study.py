@@ -17,9 +17,11 @@ from ._chance import beside_chance, noise_beyond
 from ._effect import Effect
 from ._enough import hidden, settled, something_left
 from ._lack_of_fit import LackOfFit
+from ._late import seems_late, slightly_late
 from ._pieces import pieces
 from ._problem import Problem
 from ._search import (
+    Found,
     LeftBehind,
     best_of_each,
     fit_model,
@@ -27,6 +29,7 @@ from ._search import (
     search,
     search_again,
     search_akin,
+    search_beside,
     search_known,
     search_pairs,
 )
@@ -181,13 +184,26 @@ class Study:
             return channel
         effects = _beside(alone, refitted, every, lack, imposed=problem.imposed) if self.pairs else []
         if effects:
-            found = search_pairs(effects, trials, known, refitted, problem, self.tell)
+            found = self._slightly_late(max(alone, key=lambda t: t.evidence), effects, problem)
+            found = found or search_pairs(effects, trials, known, refitted, problem, self.tell)
             trials = best_of_each([*trials, *(t.beside(refitted).amid(louder) for t in found.trials)])
             trials = [given, refitted, *trials]
             given, refitted, *trials = beside_chance(trials, problem, self.key)
             done = {t.effects for t in trials}
             behind = [one for one in (*behind, *found.behind) if one.effects not in done]
         return Searched(given, refitted, trials, behind, left_out, lack)
+
+    def _slightly_late(self, best: Trial, effects: Sequence[Effect], problem: Problem) -> Found | None:
+        """The best law beside a channel that is late by less than a sample, where these leave nothing but noise."""
+        sensor = seems_late(best, problem) if best.laws and len(best.effects) == 1 else None
+        if sensor is None:
+            return None
+        for other in effects:
+            if other.cause.effect is type(sensor) and other.at == sensor.at:
+                found = search_beside(best, other, sensor, problem, self.tell)
+                slight = slightly_late(found.trials, {}, problem.first.record.dt)
+                return found if slight and settled(found.trials) else None
+        return None
 
     def _amid_noise(
         self, given: Trial, refitted: Trial, found: Sequence[Trial], problem: Problem

@@ -1,5 +1,6 @@
 """What was measured: records, their files, their units and their noise."""
 
+from jfsm.records._advance import advanced as advanced
 from jfsm.records._combine import align as align
 from jfsm.records._combine import join as join
 from jfsm.records._declip import declipped as declipped
