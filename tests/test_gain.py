@@ -90,3 +90,23 @@ def test_a_channel_that_rests_where_it_is_held_out_is_judged_in_its_noise():
         model, lambda of: model, lambda of: model, held, noise, prepare(record, model), jax.random.key(0)
     )
     assert gain.channels["displacement 1"].spread == pytest.approx(step / np.sqrt(12.0)) and np.isfinite(gain.before)
+
+
+def test_torn_readings_are_no_errors_of_a_run():
+    record = pushed(9.0)
+    parts = [jfsm.LinearDamping(1.5, at=(0, 1)), jfsm.LinearStiffness(9.0, at=(0, 1))]
+    given, floor = jfsm.Structure([1.0], parts), 1e-5
+    nearly = given.with_values({"damping@0-1.c": VISCOUS}) + jfsm.SmoothCoulomb(FRICTION, 1e-2, at=(0, 1))
+    y = record.channels["displacement", 1].copy()
+    y[np.random.default_rng(2).choice(y.size, y.size // 100, replace=False)] += 10 * y.std()
+    for shown in (record, jfsm.Record(record.time, record.force, displacement=y)):
+        gain, _ = measure_gain(
+            given,
+            lambda of: given,
+            lambda of: nearly,
+            [HeldOut(shown, len(shown) // 2)],
+            {("displacement", 1): floor},
+            prepare(shown, given),
+            jax.random.key(0),
+        )
+        assert gain.closed > 0.99

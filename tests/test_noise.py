@@ -173,6 +173,24 @@ def test_spikes_of_one_and_two_samples_are_found_and_nothing_else():
     np.testing.assert_array_equal(spikes(y, std), torn)
 
 
+def test_spikes_are_found_in_crowds_and_at_the_ends():
+    rng = np.random.default_rng(8)
+    y = OSCILLATORS[0.0]["velocity"].copy()
+    std = 0.01 * y.std()
+    y += std * rng.standard_normal(y.size)
+    torn = np.zeros(y.size, dtype=bool)
+    torn[[0, 700, 702, 740, 1500, 1501, 1504, y.size - 2]] = True
+    y[torn] += rng.choice([-1.0, 1.0], 8) * rng.uniform(5.0, 12.0, 8) * y.std()
+    np.testing.assert_array_equal(spikes(y, std), torn)
+
+
+def test_a_curve_that_begins_steeply_has_no_spike_at_its_ends():
+    rng = np.random.default_rng(8)
+    for phase in rng.uniform(0.0, 2 * np.pi, 50):
+        y = np.sin(2 * np.pi * np.arange(3000) / 12 + phase) + 0.01 * rng.standard_normal(3000)
+        assert not spikes(y, 0.01).any()
+
+
 @pytest.mark.parametrize("samples_per_period", [9, 20, 200])
 def test_crests_of_an_oscillation_are_no_spikes(samples_per_period):
     y = np.sin(2 * np.pi * np.arange(3000) / samples_per_period)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..dynamics import Reconstruction, simulate
 from ..identification import Nuisances
-from ..records import Record
+from ..records import Record, bridged, spikes
 from ..structures import Structure
 from ._holdout import HeldOut
 from ._trial import FILTERED, PREDICTED
@@ -139,9 +139,7 @@ def measure_gain(
         # What remembers shows at no instant: it is led to where a run begins, or would begin relaxed.
         lead = math.ceil(_LEAD * period) if remembers else 0
         record, begin = (part.record[part.begin :], 0) if fitted.drifts else part.led_by(lead)
-        if wandering:  # a run begins as the readings say
-            shown = {c: steady(y) if c in wandering else y for c, y in record.channels.items()}
-            record = remeasured(record, shown, {}, seed)
+        record = _told(record, wandering, noise, seed)
         stretches = _stretches(record, period) if fitted.drifts else [slice(0, len(record))]
         window = _window(min(s.stop - s.start for s in stretches), period)
         counted = _counted(record, stretches, window, begin)
@@ -173,6 +171,19 @@ def measure_gain(
     spreads = np.array([c.spread for c in channels.values()])
     interval = _interval(np.mean(np.stack(pieces) / spreads**2, -1), total["floor"], seed)
     return Gain(**total, channels=channels, interval=interval), curves
+
+
+def _told(record: Record, wandering: Sequence[tuple], noise: Mapping[tuple, float], rng) -> Record:
+    """The record as it tells of the motion: without torn readings, and without what is slow where a zero wanders.
+
+    A run begins as it says, and is measured by it.
+    """
+    shown = dict(record.channels)
+    for channel, y in record.answers.items():
+        whole = bridged(y, spikes(y, noise.get(channel, 0.0)))
+        shown[channel] = steady(whole) if channel in wandering else whole
+    same = all(y is record_y for y, record_y in zip(shown.values(), record.channels.values(), strict=True))
+    return record if same else remeasured(record, shown, {}, rng)
 
 
 def _stretches(record: Record, period: float) -> list[slice]:

@@ -23,7 +23,7 @@ from scipy.interpolate import BSpline
 from scipy.linalg import cholesky_banded, solveh_banded
 from scipy.sparse import csr_array, diags_array
 
-from ..records import NoiseFloor, Record, noise_floor, spikes
+from ..records import NoiseFloor, Record, bridged, noise_floor, spikes
 from ..structures import AbstractSensor, AccelerationBias, AccelerationGain, ChannelDelay, Offset, Structure
 from ._excitation import Size, substeps_for
 
@@ -217,7 +217,7 @@ def _channel(
     noise = max(noise_of(floor, size), _LEAST_NOISE * size)
     torn = spikes(y, noise)
     if np.any(torn):
-        y = np.where(torn, np.interp(record.time, record.time[~torn], y[~torn]), y)
+        y = bridged(y, torn)
         notes.append(f"{channel[0]} {channel[1]}: {int(torn.sum())} torn samples are interpolated.")
     return channel[0], _Reading(np.arange(y.size) - stated(ChannelDelay) / record.dt, y, noise)
 

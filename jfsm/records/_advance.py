@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from jfsm.records._defects import clipped, spikes
+from jfsm.records._defects import bridged, clipped, spikes
 from jfsm.records._noise_floor import noise_floor
 from jfsm.records._resample import filtered
 
@@ -14,5 +14,4 @@ def advanced(y: Samples, samples: float, dt: float) -> Samples:
     """A channel (n,) so many of its samples later, band-limited between them; clipped and torn ones stay."""
     left = clipped(y) | spikes(y, noise_floor(y, dt).std)
     index = np.arange(y.size, dtype=np.float64)
-    whole = np.interp(index, index[~left], y[~left])
-    return np.where(left, y, filtered(whole[:, None], index + samples, 1.0)[:, 0])
+    return np.where(left, y, filtered(bridged(y, left)[:, None], index + samples, 1.0)[:, 0])

@@ -1,7 +1,10 @@
 """Samples that are not readings: limited by the recorder, or torn out of the curve."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
 from scipy.ndimage import maximum_filter1d, median_filter
 
 from jfsm.records._quantisation import quantisation_step
@@ -16,10 +19,11 @@ SPIKE_ROBUST, SPIKE_FLOORS = 8.0, 6.0  # a spike is this many robust deviations 
 SURROUNDING = 101  # samples in which the robust deviation is taken
 OUTSIDE = 0.75  # share of a spike's height that must stand out of the range of the samples beside it
 ALONE = 3.0  # times as far off as anything that is left around it: where a channel rattles, its crests are no spikes
-# A sample minus the quintic through its six neighbours; one sample, and two, from the quintic through those beside.
-OFF_CURVE = np.array([-1.0, 6.0, -15.0, 20.0, -15.0, 6.0, -1.0]) / 20.0
-BRIDGE_ONE = np.array([[1.0, -6.0, 15.0, 15.0, -6.0, 1.0]]) / 20.0
-BRIDGE_TWO = np.array([[12.0, -63.0, 126.0, 63.0, -42.0, 9.0], [9.0, -42.0, 63.0, 126.0, -63.0, 12.0]]) / 105.0
+OFF_CURVE = np.array([-1.0, 6.0, -15.0, 20.0, -15.0, 6.0, -1.0]) / 20.0  # a sample minus the quintic through six beside
+BESIDE = 3  # samples on either side of a spike that make its curve
+TORN = ((0,), (0, 1), (-1, 0), (0, 2), (-2, 0))  # which samples a spike takes, beside the one that is farthest off
+PASSES = 2  # of three that are close together, the third is seen once the others are mended
+ONE_SIDED = 2.0  # times as far off where the curve ends beside a spike and goes on by itself
 
 
 def clipped(y: ArrayLike) -> NDArray[np.bool_]:
@@ -63,9 +67,9 @@ def spikes(y: ArrayLike, std: float) -> NDArray[np.bool_]:
     Returns
     -------
     mask : (n,) bool array
-        One sample or two side by side, off the running median of five by more than 6 floors, and off the quintic
-        through their neighbours by more than 8 robust standard deviations of the samples around, and by three times
-        what remains around it when the spikes are gone.
+        One sample or two, side by side or with one between them, off the running median of five by more than 6 floors,
+        off the curve through their neighbours by more than 8 robust standard deviations of the samples around, and by
+        three times what remains around them when the spikes are gone.
 
     Notes
     -----
@@ -77,16 +81,28 @@ def spikes(y: ArrayLike, std: float) -> NDArray[np.bool_]:
     mask = np.zeros(y.size, dtype=bool)
     if y.size < 2 * OFF_CURVE.size:
         return mask
-    off_median = np.abs(y - median_filter(y, size=5, mode="nearest"))
-    disturbance = _off_curve(y)
-    limit = SPIKE_ROBUST * np.maximum(_deviation_around(disturbance), 1e-12 * np.ptp(y))
-    suspects = np.flatnonzero((off_median > SPIKE_FLOORS * std) & (disturbance > limit))
-    for i in suspects[np.argsort(-disturbance[suspects])]:  # the highest first: they disturb their neighbours
-        for bridge, first in ((BRIDGE_ONE, i), (BRIDGE_TWO, i), (BRIDGE_TWO, i - 1)):
-            if _bridged(y, first, bridge, float(limit[i])):
-                mask[first : first + len(bridge)] = True
-    height = maximum_filter1d(np.abs(original - y), 3)  # two side by side stand or fall together
-    return mask & (height > ALONE * maximum_filter1d(_off_curve(y), SURROUNDING))
+    for _ in range(PASSES):
+        off_median = np.abs(y - median_filter(y, size=5, mode="mirror"))
+        disturbance = _off_curve(y)
+        disturbance[[0, -1]] = off_median[[0, -1]]  # continued beyond itself, an end is never off
+        limit = SPIKE_ROBUST * np.maximum(_deviation_around(disturbance), 1e-12 * np.ptp(y))
+        suspects = np.flatnonzero((off_median > SPIKE_FLOORS * std) & (disturbance > limit))
+        for i in suspects[np.argsort(-disturbance[suspects])]:  # the highest first: they disturb their neighbours
+            for torn in TORN:
+                if not mask[i] and _mended(y, i + np.array(torn), float(limit[i])):
+                    mask[i + np.array(torn)] = True
+    height = maximum_filter1d(np.abs(original - y), 5)  # what is torn together stands or falls together
+    left = _off_curve(y)
+    left[:BESIDE] = left[-BESIDE:] = 0.0  # of the ends no curve tells
+    return mask & (height > ALONE * maximum_filter1d(left, SURROUNDING))
+
+
+def bridged(y: NDArray[np.float64], lost: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """The channel with a cubic spline through its other samples where samples are lost."""
+    if not np.any(lost):
+        return y
+    index = np.arange(y.size)
+    return np.where(lost, CubicSpline(index[~lost], y[~lost])(index), y)
 
 
 def _off_curve(y: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -94,21 +110,33 @@ def _off_curve(y: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.abs(np.convolve(np.pad(y, 3, mode="reflect", reflect_type="odd"), OFF_CURVE, mode="valid"))
 
 
-def _bridged(y: NDArray[np.float64], first: int, bridge: NDArray[np.float64], limit: float) -> bool:
-    """Replace the samples of `y` that a bridge spans by its curve, if they are a spike."""
-    last = first + len(bridge)
-    if first < 3 or last + 3 > y.size:
+def _mended(y: NDArray[np.float64], torn: NDArray[np.int_], limit: float) -> bool:
+    """Replace these samples of `y` by the curve of those beside, if they are a spike."""
+    if torn[0] < 0 or torn[-1] >= y.size:
         return False
-    beside = np.concatenate([y[first - 3 : first], y[last : last + 3]])
-    curve = bridge @ beside
-    height = np.abs(y[first:last] - curve)
-    nearest = beside[1:-1]
-    outside = np.maximum(y[first:last] - nearest.max(), nearest.min() - y[first:last])
-    steepest = max(np.abs(np.diff(beside[:3])).max(), np.abs(np.diff(beside[3:])).max())
+    around = np.arange(max(torn[0] - BESIDE, 0), min(torn[-1] + BESIDE + 1, y.size))
+    beside = np.setdiff1d(around, torn)
+    curve = _through(tuple(beside - torn[0]), tuple(torn - torn[0])) @ y[beside]
+    height = np.abs(y[torn] - curve)
+    nearest = y[beside[(beside > torn[0] - BESIDE) & (beside < torn[-1] + BESIDE)]]
+    outside = np.maximum(y[torn] - nearest.max(), nearest.min() - y[torn])
+    steepest = max(
+        np.abs(np.diff(y[part])).max(initial=0.0) for part in (beside[beside < torn[0]], beside[beside > torn[-1]])
+    )
+    limit *= 1.0 if beside.size >= 2 * BESIDE else ONE_SIDED
     if np.any(height <= max(limit, steepest)) or np.any(outside < OUTSIDE * height):
         return False
-    y[first:last] = curve
+    y[torn] = curve
     return True
+
+
+@lru_cache
+def _through(beside: tuple[int, ...], lost: tuple[int, ...]) -> NDArray[np.float64]:
+    """Weights (lost, beside) that give lost samples of the polynomial through those beside."""
+    powers = np.arange(len(beside))
+    return np.linalg.solve(
+        np.array(beside, float)[None, :] ** powers[:, None], np.array(lost, float)[None, :] ** powers[:, None]
+    ).T
 
 
 def _deviation_around(distance: NDArray[np.float64]) -> NDArray[np.float64]:
