@@ -62,7 +62,7 @@ class Played:
 def examine(seed: int, noise: Sequence[float]) -> Row:
     """The challenge of a seed, its rivals, and what the advised test says of them."""
     challenge = soiled(draw(seed, causes=ALIKE, noise=noise, excitation=DRIVEN), "short")
-    d = diagnosed(challenge)
+    d = diagnosed(challenge, max_causes=1)
     row: Row = {"seed": seed, "cause": challenge.cause, "noise": challenge.noise, "excitation": challenge.excitation}
     if d.leading is None or challenge.cause not in {rival.name for rival in d.leading.rivals}:
         return row

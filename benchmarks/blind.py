@@ -145,8 +145,8 @@ def answer(diagnosis: Any) -> Row:
     }
 
 
-def diagnosed(challenge: Challenge | ChainChallenge) -> Any:
-    """What is said of a challenge to the owner of its model."""
+def diagnosed(challenge: Challenge | ChainChallenge, **how: Any) -> Any:
+    """What is said of a challenge to the owner of its model; `how` it is asked goes to `diagnose`."""
     import jax  # only in the workers, whose environment is settled before it is loaded
 
     import jfsm
@@ -160,7 +160,7 @@ def diagnosed(challenge: Challenge | ChainChallenge) -> Any:
         springs = [jfsm.LinearStiffness(k, at=at) for at, k in believed.stiffness.items()]
         dashpots = [jfsm.LinearDamping(c, at=at) for at, c in believed.damping.items()]
         model = jfsm.Structure(mass=list(believed.mass), terms=[*springs, *dashpots])
-    return jfsm.diagnose(record, model, holdout=HOLDOUT, key=jax.random.key(challenge.seed))
+    return jfsm.diagnose(record, model, holdout=HOLDOUT, key=jax.random.key(challenge.seed), **how)
 
 
 def earlier_rows(path: Path, drawing: Drawing) -> list[Row]:

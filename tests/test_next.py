@@ -61,6 +61,18 @@ def test_the_same_key_proposes_the_same(undecided):
     assert _tried(one, Variation(level=2.0), "", key)[0].nats == _tried(again, Variation(level=2.0), "", key)[0].nats
 
 
+def test_where_no_test_tells_much_the_best_is_proposed_longer_and_tells_more(undecided, monkeypatch):
+    monkeypatch.setattr(Leading, "tests", lambda leading: [Variation(speed=0.7), Variation(level=0.9)])
+    found = undecided.next_tests()
+    lengths = [len(p.record) for p in found]
+    assert len(found) == 3 and max(lengths) == lengths[0] == 4 * min(lengths)
+    assert found[0].nats > found[1].nats and found[0].what.endswith(", there and back until it is 4 times as long")
+    force = found[0].record.force
+    assert force is not None
+    np.testing.assert_array_equal(force, np.concatenate([half := force[: len(force) // 2], half]))
+    np.testing.assert_array_equal(half, half[::-1])
+
+
 def test_what_nothing_competes_with_needs_no_other_test(undecided):
     leading = undecided.leading
     shares = {id(t): share for t, share in zip(leading.rivals, (0.99, 0.01), strict=True)}
@@ -111,6 +123,10 @@ def test_damping_that_turns_positive_is_damping_that_grows_beside_less_of_its_ow
         (Variation(speed=1.4), "the same force played 1.4 times as fast"),
         (Variation(shift=0.5), "the same force with a constant force of +1 N added"),
         (Variation(kind="velocity"), "the same test with the velocity measured as well"),
+        (
+            Variation(level=2.0, length=3),
+            "the same force at 2 times the size, there and back until it is 3 times as long",
+        ),
     ],
 )
 def test_a_test_is_put_in_words(drive: Variation, what: str):

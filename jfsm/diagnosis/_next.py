@@ -7,7 +7,7 @@ counts, for which of them is right is not known.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -32,6 +32,8 @@ RIVAL = 0.02
 """Probability from which another explanation is a rival."""
 _LEVELS, _SPEEDS, _SHIFTS = (0.25, 0.5, 2.0, 4.0), (0.7, 1.4), (0.5, -0.5)
 """How much larger and faster the drive of a test may be, and a constant force beside it in its rms."""
+_LONGER, _PLENTY = 4, 20.0
+"""How much longer the best test is proposed as well, and the nats from which it is long enough."""
 _SIDE = 21
 """States to a side on which forces are compared,"""
 _SAME = 0.02
@@ -72,15 +74,20 @@ class Proposal:
 @dataclass(frozen=True)
 class Variation:
     """A record at hand, changed: drive times `level`, `speed` times as fast, constant forces of `shift` times its rms,
-    and channels of another kind."""
+    and channels of another kind; the drive there and back, until it is `length` times as long."""
 
     level: float = 1.0
     speed: float = 1.0
     shift: float = 0.0
     kind: str = ""
+    length: int = 1
 
     def words(self, record: Record) -> str:
         """What to do, as a sentence without a stop."""
+        longer = f", there and back until it is {self.length} times as long" if self.length > 1 else ""
+        return self._what(record) + longer
+
+    def _what(self, record: Record) -> str:
         shaken = record.drive == "motion" or record.base_acceleration is not None
         drive = "the same motion" if shaken else "the same force" if record.driven else "a release"
         if self.kind:
@@ -136,14 +143,22 @@ class Leading:
 
 def proposals(leading: Leading, key: jax.Array, tell: Callable[[str, int, int], None] | None = None) -> list[Proposal]:
     """Every test that could be simulated, the one that tells most first."""
-    tests = leading.tests()
-    found = []
-    for done, test in enumerate(tests):
-        words = test.words(leading.nuisances.record)
+    tests, found = leading.tests(), list[tuple[Proposal, Variation]]()
+    record = leading.nuisances.record
+
+    def tried(test: Variation, done: int) -> list[Proposal]:
+        words = test.words(record)
         if tell is not None:
-            tell(words, done, len(tests))
-        found += _tried(leading, test, words, jax.random.fold_in(key, done))
-    return sorted(found, key=lambda p: -p.nats)
+            tell(words, done, max(len(tests), done + 1))
+        return _tried(leading, test, words, jax.random.fold_in(key, done))
+
+    for done, test in enumerate(tests):
+        found += [(proposal, test) for proposal in tried(test, done)]
+    if found and record.driven and record.drive == "force":
+        best, test = max(found, key=lambda one: one[0].nats)
+        longer = replace(test, length=_LONGER)
+        found += [(p, longer) for p in tried(longer, len(tests))] if best.nats < _PLENTY else []
+    return sorted((proposal for proposal, _ in found), key=lambda p: -p.nats)
 
 
 def _tried(leading: Leading, test: Variation, words: str, key: jax.Array) -> list[Proposal]:
@@ -220,17 +235,21 @@ def _made(
 
 def _plan(record: Record, test: Variation) -> Record:
     """Time and drive of a test, from rest where anything drives, with channels that hold nothing yet."""
-    time = record.time[0] + (record.time - record.time[0]) / test.speed
+    time = record.time[0] + record.dt * np.arange(test.length * len(record)) / test.speed
+
+    def lasting(y: np.ndarray) -> np.ndarray:
+        return np.concatenate([y[::-1] if turn % 2 else y for turn in range(test.length)])
+
     channels: dict[str, Any] = {}
     for (kind, j), y in record.channels.items():
         drives = (kind != "force") == (record.drive == "motion")
         shift = test.shift * _rms(y) if kind == "force" else 0.0
-        channels.setdefault(kind, {})[j] = test.level * y + shift if drives else np.zeros(y.size)
+        channels.setdefault(kind, {})[j] = lasting(test.level * y + shift) if drives else np.zeros(time.size)
     if test.kind:
         channels[test.kind] = {j: np.zeros(time.size) for j in sorted({j for kind, j in record.responses})}
     base = record.base_acceleration
     if base is not None:
-        channels["base_acceleration"] = test.level * base
+        channels["base_acceleration"] = lasting(test.level * base)
     return Record(time, **channels, at_rest=record.driven, drive=record.drive, units=dict(record.units))
 
 
