@@ -64,9 +64,11 @@ def _unfit(trial: Trial, problem: Problem) -> Unfit:
     shapes = _shapes(trial, posterior, links, runs)
     parts = [moved(trial, posterior, index, shape) for index, shape in enumerate(shapes)]
     error, by_unknown, by_shape = (np.concatenate(part) for part in zip(*parts, strict=True))
+    digits = all(np.all(nuisances.coarse) for nuisances in posterior.records)
     (left, told), (less, more) = _left(by_unknown, error), _left(np.hstack([by_unknown, by_shape]), error)
     nats = (left - less) / 2 - (more - told) / 2  # half of chi-square, less half of its mean
-    return Unfit(nats, (left - less) / max(left, np.finfo(float).tiny), _strays(posterior, runs))
+    # Errors of coarse digits are a curve of the motion as well, if a small one.
+    return Unfit(0.0 if digits else nats, (left - less) / max(left, np.finfo(float).tiny), _strays(posterior, runs))
 
 
 def _strays(posterior: Posterior, runs: Sequence[np.ndarray]) -> float:

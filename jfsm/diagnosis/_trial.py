@@ -27,6 +27,8 @@ _LOST = 0.05
 """Share of a baseline's error that noise may leave of a prediction, whatever its filter says."""
 _ENOUGH = 1600
 """Samples from which a lag-one correlation is told as it is: chance then leaves a fortieth."""
+_OF_DIGITS = 0.3
+"""Share of the correlation of a coarse channel's innovations that counts: its digits' errors repeat with the motion."""
 
 
 @dataclass(frozen=True)
@@ -245,7 +247,7 @@ def extent(nuisances: Nuisances) -> np.ndarray:
 def whiteness(posterior: Posterior, theta: np.ndarray) -> float:
     """Largest lag-one correlation of the innovations of any channel over the samples that were fitted.
 
-    Of few samples it is made smaller, as chance is larger there.
+    Of few samples it is made smaller, as chance is larger there; of a coarse channel, too, whose errors repeat.
     """
     worst = 0.0
     for index, nuisances in enumerate(posterior.records):
@@ -254,6 +256,7 @@ def whiteness(posterior: Posterior, theta: np.ndarray) -> float:
         alive = (np.asarray(nuisances.readings.use)[counted] > 0) & (found.variance[counted] > 0)
         r = np.where(alive, found.error[counted] / np.sqrt(np.where(alive, found.variance[counted], 1.0)), 0.0)
         correlation = np.abs(np.sum(r[1:] * r[:-1], 0) / np.maximum(np.sum(r * r, 0), 1e-300))
+        correlation = np.where(nuisances.coarse, _OF_DIGITS * correlation, correlation)
         worst = max(worst, float(np.max(correlation)) * min(1.0, math.sqrt(len(r) / _ENOUGH)))
     return worst
 

@@ -25,7 +25,7 @@ from ..dynamics._plant import Channel, Readout, lower, readout
 from ..dynamics._simulate import check_pair
 from ..dynamics._start import starting_state
 from ..estimation._filter import ProcessNoise, Readings
-from ..records import NoiseFloor, Record, clipped, declipped, noise_floor, spikes, tones
+from ..records import NoiseFloor, Record, clipped, declipped, noise_floor, quantisation_step, spikes, tones
 from ..structures import Structure
 
 _LEAST_NOISE = 1e-4
@@ -133,6 +133,14 @@ class Nuisances:
     def judged(self) -> np.ndarray:
         """Which of the channels a hypothesis has to predict."""
         return np.array([channel in self.record.answers for channel in self.channels])
+
+    @cached_property
+    def coarse(self) -> np.ndarray:
+        """Which channels (channels,) err by the steps of their digits more than by noise: again the same where the
+        motion is."""
+        values = np.asarray(self.readings.values)[: self.samples]
+        steps = np.array([quantisation_step(values[:, c]) for c in range(len(self.channels))])
+        return steps**2 / 12 > _MOSTLY * self.floor**2
 
     @cached_property
     def leading(self) -> int:
