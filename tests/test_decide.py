@@ -491,7 +491,7 @@ def test_an_unlikely_cause_that_leaves_something_must_be_confirmed_by_held_out_r
     winner = trial(9000.0, left, "coulomb")
     gain = Gain(before=0.1, refitted=0.1, after=0.08, floor=0.01, channels={}, interval=(low, 0.6))
     decision = Decision("cause", winner, {id(winner): probability}, {}, {})
-    assert bool(_speaks_against(gain, decision)) != named
+    assert bool(_speaks_against(gain, decision, 20.0)) != named
 
 
 @pytest.mark.parametrize(
@@ -508,7 +508,7 @@ def test_what_held_out_runs_speak_against_does_not_stand(verdict: str, lasting: 
     winner = trial(9000.0, 0.002, "coulomb")
     gain = Gain(before=1.0, refitted=1.0, after=after, floor=0.01 * after, channels={}, interval=(0.2, 0.6))
     decision = Decision(verdict, winner, {id(winner): 0.9}, {}, {})
-    assert bool(_speaks_against(gain, decision, lasting=lasting)) != stands
+    assert bool(_speaks_against(gain, decision, 20.0, lasting=lasting)) != stands
 
 
 @pytest.mark.parametrize(
@@ -561,13 +561,18 @@ def test_a_constant_force_that_an_offset_stands_for_is_told_by_evidence_alone(la
     assert decision.verdict == verdict
 
 
-@pytest.mark.parametrize(("kappa", "low", "named"), [(0.0, 0.3, True), (0.0, -0.3, False), (0.6, -0.3, True)])
-def test_what_no_prediction_shows_is_named_if_the_held_out_run_confirms_it(kappa: float, low: float, named: bool):
+@pytest.mark.parametrize(
+    ("kappa", "low", "ahead", "named"),
+    [(0.0, 0.3, 20.0, True), (0.0, -0.3, 20.0, False), (0.6, -0.3, 20.0, True), (0.0, -0.3, 40.0, True)],
+)
+def test_what_no_prediction_shows_is_named_if_the_held_out_run_confirms_it_or_it_is_surely_there(
+    kappa: float, low: float, ahead: float, named: bool
+):
     winner = trial(9000.0, 0.0, "preload")
     winner.laws = (jfsm.Preload(1.0, at=(0, 1)),)
     gain = Gain(before=0.2, refitted=0.05, after=0.05, floor=0.05, channels={}, interval=(low, 1.0))
     decision = Decision("cause", winner, {id(winner): 1.0}, {id(winner): kappa}, {})
-    assert bool(_speaks_against(gain, decision)) != named
+    assert bool(_speaks_against(gain, decision, ahead)) != named
 
 
 @pytest.mark.parametrize(("behind", "verdict"), [(4.0, "parameters"), (0.5, "undecided")])

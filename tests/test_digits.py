@@ -37,4 +37,4 @@ def test_what_few_digits_err_does_not_speak_against_a_law():
     d = jfsm.diagnose(shaken(15), BELIEVED, causes=["square_stiffness", "quadratic_damping"], key=jax.random.key(0))
     assert [f.cause for f in d.findings] == ["square_stiffness"] and d.findings[0].probability > 0.9
     law = next(c for c in d.candidates if c.cause == "square_stiffness")
-    assert law.whiteness < 0.1 and law.unfit == 0.0
+    assert law.whiteness is not None and law.whiteness < 0.1 and law.unfit == 0.0

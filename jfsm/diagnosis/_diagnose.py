@@ -27,6 +27,7 @@ from ._next import Leading
 from ._problem import Problem
 from ._report import Tested, assemble
 from ._residual import residual, stand_in
+from ._standing import UNPREDICTED
 from ._study import Searched, Study
 from ._trial import Trial
 from ._untold import in_step, untold
@@ -35,6 +36,8 @@ from ._wandering import steadied
 _WORSE = 1.5
 """Error on held-out readings, in errors of the model as given and in those that noise leaves, from which a cause makes
 the model worse."""
+_SURELY = 2 * UNPREDICTED
+"""Nats by which a law that leaves noise only is ahead of its absence, so that no prediction has to show it."""
 _ROUNDS = 3
 """Times that a record is looked into, at most, in which channels turn out to be late by less than a sample."""
 Progress = Callable[[str, int, int], None]
@@ -196,7 +199,7 @@ def _concluded(
         judged, tried, decision = _decided(found, problem, lasting=lasting)
         if clipped:
             decision = beside_clipping(decision, clipped, tried.refitted)
-        confirmed = _confirmed(decision, tried.refitted, model, stated, held, judged.first, key, lasting=lasting)
+        confirmed = _confirmed(decision, tried, model, stated, held, judged.first, key, lasting=lasting)
         return judged, tried, *confirmed
 
     reached = concluded(lasting=False)
@@ -207,7 +210,7 @@ def _concluded(
 
 def _confirmed(
     decision: Decision,
-    refitted: Trial,
+    tried: Searched,
     model: Structure,
     stated: Structure,
     held: Sequence[HeldOut],
@@ -222,6 +225,8 @@ def _confirmed(
     decides.
     """
 
+    refitted, ahead = tried.refitted, decision.winner.evidence - max(tried.given.evidence, tried.refitted.evidence)
+
     def gained(extended: StructureOf) -> tuple[Gain | None, list[dict]]:
         if not held:
             return None, []
@@ -230,7 +235,7 @@ def _confirmed(
 
     extended = (lambda record: model) if decision.verdict == "consistent" else decision.winner.extended
     gain, runs = gained(extended)
-    if gain is not None and (against := _speaks_against(gain, decision, lasting=lasting)):
+    if gain is not None and (against := _speaks_against(gain, decision, ahead, lasting=lasting)):
         decision = decision.refused(against, refitted)
         extended = refitted.extended
         gain, runs = gained(extended)
@@ -257,15 +262,16 @@ def _closes_too_little(gain: Gain, decision: Decision) -> bool:
     return unsettled and gain.closable and gain.interval[1] < GATE
 
 
-def _speaks_against(gain: Gain, decision: Decision, *, lasting: bool = False) -> str:
-    """Why runs on held-out readings speak against what was found, or nothing."""
+def _speaks_against(gain: Gain, decision: Decision, ahead: float, *, lasting: bool = False) -> str:
+    """Why runs on held-out readings speak against what was found, so many nats `ahead` of no effect; or nothing."""
     if decision.verdict in ("cause", "unnamed") and gain.after > _WORSE * max(gain.before, gain.floor):
         return "runs worse on held-out readings than the model as given"
     unsure = decision.verdict == "cause" and decision.share(decision.winner) < 0.5 and not adequate(decision.winner)
     if unsure and not (gain.closable and gain.significant):
         return "is not likely, leaves something, and is not confirmed by held-out readings"
     unpredicted = decision.verdict == "cause" and decision.winner.laws and decision.kappa[id(decision.winner)] == 0.0
-    if unpredicted and not (gain.closable and gain.significant):
+    sure = ahead > _SURELY and adequate(decision.winner)
+    if unpredicted and not sure and not (gain.closable and gain.significant):
         return "explains nothing that predictions leave, and is not confirmed by held-out readings"
     if (decision.verdict == "unnamed" or lasting) and gain.closable and gain.closed < GATE:
         return "closes less than half of the error on held-out readings"
