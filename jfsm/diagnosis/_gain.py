@@ -178,12 +178,12 @@ def _told(record: Record, wandering: Sequence[tuple], noise: Mapping[tuple, floa
 
     A run begins as it says, and is measured by it.
     """
-    shown = dict(record.channels)
-    for channel, y in record.answers.items():
-        whole = bridged(y, spikes(y, noise.get(channel, 0.0)))
-        shown[channel] = steady(whole) if channel in wandering else whole
-    same = all(y is record_y for y, record_y in zip(shown.values(), record.channels.values(), strict=True))
-    return record if same else remeasured(record, shown, {}, rng)
+    torn = {channel: spikes(y, noise.get(channel, 0.0)) for channel, y in record.answers.items()}
+    if not wandering and not any(np.any(lost) for lost in torn.values()):
+        return record
+    shown = {**record.channels, **{channel: bridged(record.channels[channel], lost) for channel, lost in torn.items()}}
+    shown |= {channel: steady(shown[channel]) for channel in wandering}
+    return remeasured(record, shown, {}, rng)
 
 
 def _stretches(record: Record, period: float) -> list[slice]:
