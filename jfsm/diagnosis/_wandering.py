@@ -9,6 +9,8 @@ from ._trial import Trial
 
 _DEGREE = 5
 """Of the polynomials of time that stand for what is slow."""
+_PERIODS = 2 * _DEGREE
+"""Of the motion, from which these are slow beside it."""
 PLAINLY, SLOWLY = 0.25, 0.05
 """Share of a channel's innovations that is slow, from which its zero may wander: beside the model alone, of which what
 it lacks may be slow as well, and beside the likeliest law."""
@@ -19,7 +21,8 @@ def wandering(beside: Trial, problem: Problem, least: float) -> int | None:
 
     At `least` that share of its innovations is slow, and they are far likelier where the zero may wander.
     """
-    if problem.imposed:
+    periods = [until * n.record.dt / n.period for n, until in zip(problem.records, problem.until, strict=True)]
+    if problem.imposed or min(periods) < _PERIODS:
         return None
     posterior, known = problem.posterior_of(beside), problem.first.readings.wandering
     shares = np.mean([_slow(posterior, beside, index) for index in range(len(problem.records))], 0)
