@@ -39,3 +39,10 @@ def test_what_a_law_makes_slow_is_not_taken_for_a_zero():
 
     d = jfsm.diagnose(made(one_sided), RIGHT, causes=FEW, key=jax.random.key(0))
     assert [f.cause for f in d.findings] == ["quadratic_stiffness"] and not any("wanders" in note for note in d.notes)
+
+
+def test_of_few_periods_what_a_law_makes_is_not_taken_for_a_zero():
+    record = made(duffing, samples=200, channels=("displacement",))
+    d = jfsm.diagnose(record, RIGHT, causes=FEW, key=jax.random.key(0))
+    assert not any("wanders" in note for note in d.notes)
+    assert [f.cause for f in d.findings] == ["cubic_hardening"]
