@@ -162,25 +162,28 @@ def test_levels_that_are_reached_gently_or_switched_are_not_clipped(case):
     assert not clipped(UNCLIPPED[case]).any()
 
 
-def test_spikes_of_one_and_two_samples_are_found_and_nothing_else():
+def torn_at(places: list[int], heights_of) -> tuple[np.ndarray, float, np.ndarray]:
+    """A motion with spikes whose heights are drawn, in its standard deviations; its noise, and which are torn."""
     rng = np.random.default_rng(8)
     y = OSCILLATORS[0.0]["velocity"].copy()
     std = 0.01 * y.std()
     y += std * rng.standard_normal(y.size)
     torn = np.zeros(y.size, dtype=bool)
-    torn[[200, 700, 701, 1500, 2400, 2401]] = True
-    y[torn] += 3.0 * y.std()
+    torn[places] = True
+    y[torn] += heights_of(rng) * y.std()
+    return y, std, torn
+
+
+def test_spikes_of_one_and_two_samples_are_found_and_nothing_else():
+    y, std, torn = torn_at([200, 700, 701, 1500, 2400, 2401], lambda rng: 3.0)
     np.testing.assert_array_equal(spikes(y, std), torn)
 
 
 def test_spikes_are_found_in_crowds_and_at_the_ends():
-    rng = np.random.default_rng(8)
-    y = OSCILLATORS[0.0]["velocity"].copy()
-    std = 0.01 * y.std()
-    y += std * rng.standard_normal(y.size)
-    torn = np.zeros(y.size, dtype=bool)
-    torn[[0, 700, 702, 740, 1500, 1501, 1504, y.size - 2]] = True
-    y[torn] += rng.choice([-1.0, 1.0], 8) * rng.uniform(5.0, 12.0, 8) * y.std()
+    def heights_of(rng: np.random.Generator) -> np.ndarray:
+        return rng.choice([-1.0, 1.0], 8) * rng.uniform(5.0, 12.0, 8)
+
+    y, std, torn = torn_at([0, 700, 702, 740, 1500, 1501, 1504, -2], heights_of)
     np.testing.assert_array_equal(spikes(y, std), torn)
 
 
