@@ -34,8 +34,11 @@ def white(trial: Trial) -> bool:
 
 
 def unexplained(baseline: Trial) -> np.ndarray:
-    """Sets of which a baseline's predictions leave anything to explain."""
-    return baseline.prediction.excess > np.maximum(NOTICEABLE * baseline.prediction.expected, 1e-9)
+    """Sets of which a baseline's predictions leave anything to explain: more than chance may, where any does."""
+    found = baseline.prediction
+    noticeable = found.excess > np.maximum(NOTICEABLE * found.expected, 1e-9)
+    beyond = noticeable & (found.beyond > 0)
+    return beyond if np.any(beyond) else noticeable
 
 
 def explained(trial: Trial, baseline: Trial) -> float:

@@ -85,4 +85,4 @@ def _noisy(nuisances: Nuisances, run: np.ndarray, levels: dict[tuple, float], rn
     force = np.asarray(nuisances.fine.force)[: nuisances.samples, 0]
     truth = dict(zip(nuisances.channels, run.T, strict=True))
     truth |= {channel: force[:, channel[1] - 1] for channel in nuisances.record.channels if channel[0] == "force"}
-    return remeasured(nuisances.record, truth, levels, rng)
+    return remeasured(nuisances.record, truth, levels, rng, nuisances.memories)

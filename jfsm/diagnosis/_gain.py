@@ -12,6 +12,7 @@ from typing import Any
 
 import jax
 import numpy as np
+from scipy.signal import lfilter
 
 from ..dynamics import Reconstruction, simulate
 from ..identification import Nuisances
@@ -145,7 +146,7 @@ def measure_gain(
         counted = _counted(record, stretches, window, begin)
         run_of = partial(_run, stretches=stretches, window=window, reconstruction=fitted.reconstruction)
         runs = {name: run_of(model, record) for name, model in models.items()}
-        left = _noise(partial(run_of, models["after"]), record, counted, runs["after"], noise, seed)
+        left = _noise(partial(run_of, models["after"]), record, counted, runs["after"], noise, fitted.memories, seed)
         off = {name: _off(run, record, counted, wandering) for name, run in runs.items()}
         pieces += _blocks([off["before"], off["after"]], period)
         for channel, y in record.answers.items():
@@ -248,26 +249,50 @@ def _counted(record: Record, stretches: Sequence[slice], window: int, begin: int
 
 
 def _noise(
-    run: Callable[[Record], dict[tuple, np.ndarray]], record: Record, counted, shown, levels: Mapping[tuple, float], rng
+    run: Callable[[Record], dict[tuple, np.ndarray]],
+    record: Record,
+    counted: np.ndarray,
+    shown: Mapping[tuple, np.ndarray],
+    levels: Mapping[tuple, float],
+    memories: Mapping[tuple, tuple[float, float]],
+    rng: np.random.Generator,
 ) -> dict[tuple, float]:
     """Mean square error that noise alone leaves, per channel: its readings', its drive's and its start's."""
     total = {c: 0.0 for c in record.answers}
     for _ in range(_DRAWS):
         # The extended model's own run stands for the truth; fresh noise on what was measured, and all steps again.
         truth = {c: shown[c] if c in shown else y for c, y in record.channels.items()}
-        again = run(remeasured(record, truth, levels, rng))
+        again = run(remeasured(record, truth, levels, rng, memories))
         for c in total:
             total[c] += float(np.mean((again[c] - shown[c])[counted] ** 2)) / _DRAWS
     return {c: total[c] + levels.get(c, 0.0) ** 2 for c in total}
 
 
 def remeasured(
-    record: Record, truth: Mapping[tuple, np.ndarray], levels: Mapping[tuple, float], rng: np.random.Generator
+    record: Record,
+    truth: Mapping[tuple, np.ndarray],
+    levels: Mapping[tuple, float],
+    rng: np.random.Generator,
+    memories: Mapping[tuple, tuple[float, float]] | None = None,
 ) -> Record:
-    """The record, had its channels measured this, with fresh noise of these standard deviations."""
+    """The record, had its channels measured this, with fresh noise of these standard deviations.
+
+    Of some of it a share has a memory, as in `Nuisances.memories`.
+    """
     kinds: dict[str, Any] = {}
     for (kind, j), y in truth.items():
-        kinds.setdefault(kind, {})[j] = y + levels.get((kind, j), 0.0) * rng.standard_normal(y.size)
+        memory, share = (memories or {}).get((kind, j), (0.0, 0.0))
+        noise = math.sqrt(1 - share) * rng.standard_normal(y.size) + math.sqrt(share) * _remembering(
+            y.size, memory, rng
+        )
+        kinds.setdefault(kind, {})[j] = y + levels.get((kind, j), 0.0) * noise
     return Record(
         record.time, **kinds, base_acceleration=record.base_acceleration, at_rest=record.at_rest, drive=record.drive
     )  # pyright: ignore
+
+
+def _remembering(n: int, memory: float, rng: np.random.Generator) -> np.ndarray:
+    """Noise (n,) of unit variance with this correlation from sample to sample."""
+    fresh = rng.standard_normal(n)
+    fresh[1:] *= math.sqrt(1 - memory**2)
+    return np.asarray(lfilter([1.0], [1.0, -memory], fresh))

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ..identification import Hypothesis, Nuisances, Posterior, prepare_all
+from ..identification import Colour, Hypothesis, Nuisances, Posterior, prepare_all
 from ..records import Record
 from ..structures import Structure
 from ._begin import Begin
@@ -40,12 +40,19 @@ class Problem(NamedTuple):
     def of(self, records: Sequence[Record], weighed: Structure) -> "Problem":
         """The same of other records of the same channels, seen as those that they stand for."""
         prepared = prepare_all(records, self.model, self.first.reconstruction, weighed=weighed)
-        wandering = [n.readings.wandering for n in self.records]
-        return self._replace(records=[n.with_wandering(c) for n, c in zip(prepared, wandering, strict=True)])
+        seen = [
+            (n if known.colour is None else n.with_colour(known.colour)).with_wandering(known.readings.wandering)
+            for n, known in zip(prepared, self.records, strict=True)
+        ]
+        return self._replace(records=seen)
 
     def with_wandering(self, channel: int) -> "Problem":
         """The same, the zero of one more channel wandering."""
         return self._replace(records=[n.with_wandering((*n.readings.wandering, channel)) for n in self.records])
+
+    def with_colour(self, colour: Colour) -> "Problem":
+        """The same, the channels' noise having this colour."""
+        return self._replace(records=[n.with_colour(colour) for n in self.records])
 
     def posterior(
         self, starts: Sequence[Structure], begins: Sequence[Begin | None] = (), *, refit: bool = True

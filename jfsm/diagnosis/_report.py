@@ -14,6 +14,7 @@ from ._between import Difference, differences
 from ._candidates import Candidate
 from ._class import WIDER, class_of
 from ._clipped import finding
+from ._coloured import memories
 from ._course import course
 from ._decide import Decision
 from ._detectable import Smallest
@@ -83,6 +84,7 @@ def assemble(
         *(note for n in records for note in n.notes),
         *how_run(records[0]),
         *zeros(records[0]),
+        *memories(records[0]),
         *differ,
         *unsteady(winner, problem),
     ]

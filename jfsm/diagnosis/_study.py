@@ -14,6 +14,7 @@ from ._adequacy import GATE, MUCH, NEGLIGIBLE, explained, white
 from ._between import differ
 from ._candidates import Apart, Candidate, as_promising, candidates, contained, promising
 from ._chance import beside_chance, noise_beyond
+from ._coloured import coloured
 from ._effect import Effect
 from ._enough import hidden, settled, something_left
 from ._lack_of_fit import LackOfFit
@@ -95,6 +96,8 @@ class Study:
             part, every, ahead = self._sought(part, given, refitted, known)
             for channel in part.first.readings.wandering:
                 problem = problem.with_wandering(channel)
+            if part.first.colour is not None:
+                problem = problem.with_colour(part.first.colour)
             problem, given, refitted = _believed(problem, near=ahead.refitted)
             found = self._fitted_again(ahead, given, refitted, problem)
             if unless_later and _later(found.refitted, NEGLIGIBLE):
@@ -108,15 +111,17 @@ class Study:
     def _sought(
         self, problem: Problem, given: Trial, refitted: Trial, known: Trial | None
     ) -> tuple[Problem, list[Candidate], Searched]:
-        """What could be tried, and what was found; the zeros of channels may turn out to wander."""
+        """What could be tried, and what was found; the zeros of channels may turn out to wander, or their noise to
+        have a memory."""
         channel = wandering(refitted, problem, PLAINLY)
-        if channel is None:
+        other = None if channel is None else problem.with_wandering(channel)
+        if other is None:
             every = candidates(self.model, [steadied(n) for n in problem.records], self.chosen, self.places)
             found = self._searched(every, given, refitted, known, problem)
             if isinstance(found, Searched):
                 return problem, every, found
-            channel = found
-        return self._sought(*_believed(problem.with_wandering(channel), near=refitted), known)
+            other = found
+        return self._sought(*_believed(other, near=refitted), known)
 
     def _fitted_again(self, ahead: Searched, given: Trial, refitted: Trial, problem: Problem) -> Searched:
         """The best of what was found in another problem, as in pieces of long records, fitted from there."""
@@ -148,10 +153,10 @@ class Study:
         refitted: Trial,
         known: Trial | None,
         problem: Problem,
-    ) -> Searched | int:
+    ) -> Searched | Problem:
         """Single effects fitted, the promising ones first, and pairs of them where that leaves something.
 
-        A channel, instead, whose zero turns out to wander beside the single ones.
+        The problem, instead, where beside these a channel's zero turns out to wander, or its noise to have a memory.
         """
         stands_for_the_drive = in_step(problem.records)
 
@@ -181,7 +186,10 @@ class Study:
         lack, alone = LackOfFit(problem), told([given, refitted, *trials])
         channel = wandering(max(alone, key=lambda t: t.evidence), problem, SLOWLY)
         if channel is not None:
-            return channel
+            return problem.with_wandering(channel)
+        other = coloured(max(alone, key=lambda t: t.evidence), problem)
+        if other is not None:
+            return other
         effects = _beside(alone, refitted, every, lack, imposed=problem.imposed) if self.pairs else []
         if effects:
             found = self._slightly_late(max(alone, key=lambda t: t.evidence), effects, problem)
@@ -189,6 +197,9 @@ class Study:
             trials = best_of_each([*trials, *(t.beside(refitted).amid(louder) for t in found.trials)])
             trials = [given, refitted, *trials]
             given, refitted, *trials = beside_chance(trials, problem, self.key)
+            other = coloured(max(told([given, refitted, *trials]), key=lambda t: t.evidence), problem)
+            if other is not None:
+                return other
             done = {t.effects for t in trials}
             behind = [one for one in (*behind, *found.behind) if one.effects not in done]
         return Searched(given, refitted, trials, behind, left_out, lack)

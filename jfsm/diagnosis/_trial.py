@@ -192,7 +192,7 @@ def predict(posterior: Posterior, theta: np.ndarray, slight: bool = False) -> Pr
         errors, expected, scatter = [], [], []
         for index, nuisances in enumerate(posterior.records):
             use, scored = windows(nuisances)
-            size = extent(nuisances)
+            size, alone = extent(nuisances), _alone(nuisances)
             found = posterior.innovations(theta, index, use=use, noise_scales=False, slack=slack)
             truth = found if slack == 0 else posterior.innovations(theta, index, use=use, noise_scales=False)
             alive = np.asarray(nuisances.readings.use)[: nuisances.samples] > 0
@@ -207,10 +207,17 @@ def predict(posterior: Posterior, theta: np.ndarray, slight: bool = False) -> Pr
                 # Readings err each by itself, a state that was filtered for a whole window: in two directions.
                 pieces = np.maximum(count * nuisances.record.dt / (nuisances.period * PREDICTED), 1.0)
                 expected.append(np.sum(noise))
-                scatter.append(np.sqrt(np.sum(2 * white**2 / count + (noise - white) ** 2 / pieces)))
+                scatter.append(np.sqrt(np.sum(2 * white**2 / (count * alone) + (noise - white) ** 2 / pieces)))
         error = np.nan_to_num(np.array(errors), nan=np.inf)
         best.append((float(np.sum(error)), Prediction(error, np.array(expected), np.array(scatter))))
     return min(best, key=lambda item: item[0])[1]
+
+
+def _alone(nuisances: Nuisances) -> np.ndarray:
+    """Share (channels,) of the readings whose noise is as good as independent, where their power is asked for."""
+    known = [nuisances.memories.get(channel, (0.0, 0.0)) for channel in nuisances.channels]
+    squared = np.array([memory**2 * share for memory, share in known])
+    return (1.0 - squared) / (1.0 + squared)
 
 
 def free_run(posterior: Posterior, theta: np.ndarray, index: int) -> np.ndarray:

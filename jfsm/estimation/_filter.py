@@ -7,11 +7,13 @@ error: an acceleration is then judged under each mode, and the most probable one
 is that of all modes, each with its probability before the reading.
 
 The zero of a channel may wander. It is a state then, with its slope: white noise twice integrated, as in a smoothing
-spline, which leaves to the structure all that is not slow.
+spline, which leaves to the structure all that is not slow. The noise of a channel may have a memory. What it remembers
+is a state as well: white noise through a filter of first order.
 
 References
 ----------
-G. Wahba, J. R. Statist. Soc. B 40 (1978) 364, of the spline.
+G. Wahba, J. R. Statist. Soc. B 40 (1978) 364, of the spline. A. E. Bryson, D. E. Johansen, IEEE Trans. Autom. Control
+10 (1965) 4, of noise with a memory as a state.
 """
 
 from collections.abc import Callable
@@ -66,8 +68,10 @@ class Readings(eqx.Module):
     """What a filter sees of a record.
 
     `values` (n, channels), `use` (n, channels) is 1 where a sample may update the state, `variance` (channels,) is
-    the white noise of each channel, `valid` (n,) is false in the padding. The zeros of the channels `wandering` begin
-    with slopes, and change these by as much a sample, of the variances `wander` (wandering, 2).
+    the noise of each channel, `valid` (n,) is false in the padding. The zeros of the channels `wandering` begin
+    with slopes, and change these by as much a sample, of the variances `wander` (wandering, 2). Of the variance of the
+    channels `coloured` a share has a memory: `colour` (coloured, 2) is its correlation from sample to sample, and that
+    share.
     """
 
     values: Float[Array, "n channels"]
@@ -76,6 +80,14 @@ class Readings(eqx.Module):
     valid: Float[Array, " n"]
     wander: Float[Array, "wandering 2"] = eqx.field(default_factory=lambda: jnp.zeros((0, 2)))
     wandering: tuple[int, ...] = eqx.field(default=(), static=True)
+    colour: Float[Array, "coloured 2"] = eqx.field(default_factory=lambda: jnp.zeros((0, 2)))
+    coloured: tuple[int, ...] = eqx.field(default=(), static=True)
+
+    @property
+    def zeros(self) -> tuple[int | None, ...]:
+        """The channel that every state of the channels adds to: a zero that wanders and its slope, which adds to none,
+        then what noise remembers."""
+        return (*(c for zero in self.wandering for c in (zero, None)), *self.coloured)
 
 
 class ProcessNoise(eqx.Module):
@@ -121,7 +133,7 @@ class State(NamedTuple):
     """What a filter carries from sample to sample.
 
     `mode` (slots,) is that of each friction slot, a whole number: it is no function of the plant's numbers. `overrun`
-    (slots,) tells how surely links rest. `zeros` are those of the wandering channels, each followed by its slope.
+    (slots,) tells how surely links rest. `zeros` are those of the channels, as in `Readings.zeros`.
     """
 
     x: Float[Array, " dof"]
@@ -131,7 +143,7 @@ class State(NamedTuple):
     past: Past
     covariance: Float[Array, "state state"]
     overrun: Float[Array, " slots"]
-    zeros: Float[Array, " two_wandering"]
+    zeros: Float[Array, " zeros"]
 
     @property
     def motion(self) -> Motion:
@@ -139,12 +151,13 @@ class State(NamedTuple):
 
 
 class Known(NamedTuple):
-    """What a run of the filter knows throughout besides the plant: its inverse mass, the channels' noise variances, and
-    how their zeros wander."""
+    """What a run of the filter knows throughout besides the plant: its inverse mass, the channels' white noise
+    variances, what a sample makes of their zeros, and the covariance that it adds to these."""
 
     minv: Float[Array, "dof dof"]
     variances: Float[Array, " channels"]
-    wander: Float[Array, "wandering 2"]
+    onward: Float[Array, "zeros zeros"]
+    stirred: Float[Array, "zeros zeros"]
 
 
 class Drive(NamedTuple):
@@ -172,10 +185,17 @@ def begun(
     minv = inverse_mass(plant)
     fine = punctual(plant, fine)
     motion, past = begin(plant, minv, start.x, start.v, fine)
-    known = Known(minv, readings.variance * jnp.exp(log_scale), readings.wander)
+    variances, picked = readings.variance * jnp.exp(log_scale), jnp.array(readings.coloured, dtype=int)
+    memory, remembered = readings.colour[:, 0], readings.colour[:, 1] * variances[picked]
+    known = Known(
+        minv,
+        variances.at[picked].add(-remembered),
+        _beside(_ramps(len(readings.wandering)), jnp.diag(memory)),
+        _beside(_about_slopes(readings.wander[:, 1]), jnp.diag((1.0 - memory**2) * remembered)),
+    )
     beyond_doubt = jnp.full(len(plant.friction), _FAR)
-    zeros = jnp.zeros(2 * len(readings.wandering))
-    covariance = _beside(start.covariance, _about_slopes(readings.wander[:, 0]))
+    zeros = jnp.zeros(len(readings.zeros))
+    covariance = _beside(start.covariance, _beside(_about_slopes(readings.wander[:, 0]), jnp.diag(remembered)))
     state = State(*motion[:3], motion.mode.astype(int), past, covariance, beyond_doubt, zeros)
     return known, state, Drive(fine.force, tuple(drive_before(fine, tau) for tau in plant.channel_delay))
 
@@ -200,7 +220,7 @@ def innovations(
     known, state, drive = begun(plant, fine, readings, start, log_scale)
 
     def body(state, inputs):
-        return one_sample(plant, known, show, noise, fine.step, readings.wandering, state, *inputs)
+        return one_sample(plant, known, show, noise, fine.step, readings.zeros, state, *inputs)
 
     loop = loop_of(plant, readings, one_kernel)
     return loop(body, state, (drive, samples_of(fine, readings)))[1]
@@ -213,7 +233,7 @@ def samples_of(fine: Fine, readings: Readings) -> Sample:
 
 def loop_of(plant: Plant, readings: Readings, one_kernel: bool) -> Callable[..., Any]:
     """`jax.lax.scan`, or the one kernel that is asked for, where the filter of this plant can be one."""
-    small = 2 * plant.dof + plant.hidden + 2 * len(readings.wandering) <= _FEW and plant.elementary
+    small = 2 * plant.dof + plant.hidden + len(readings.zeros) <= _FEW and plant.elementary
     return one_kernel_scan if one_kernel and small else jax.lax.scan
 
 
@@ -223,13 +243,13 @@ def one_sample(
     show: Readout,
     noise: ProcessNoise,
     dt,
-    wandering: tuple[int, ...],
+    of_zeros: tuple[int | None, ...],
     state: State,
     drive: Drive,
     sample: Sample,
 ) -> tuple[State, Innovations]:
     """State one sample later, and the innovations of this one; `drive` and `sample` are what comes with it."""
-    (minv, variances, wander), motion, past = known, state.motion, state.past
+    (minv, variances, onward, stirred), motion, past = known, state.motion, state.past
     dof, rows = plant.dof, plant.friction.direction
     substeps = (drive.force.shape[0] - 1) // 2
     struck = jnp.concatenate([jnp.zeros((dof, dof)), jnp.eye(dof), carried(plant)])
@@ -238,7 +258,7 @@ def one_sample(
     base, time = sample.base, sample.time
     g = load_of(plant, minv, motion, past, drive.force, base, time, dt)
     mean, updated, found = _update(
-        plant, minv, show, motion, state.zeros, wandering, state.covariance, state.overrun,
+        plant, minv, show, motion, state.zeros, of_zeros, state.covariance, state.overrun,
         Load(g[:3], base[:3], time, dt / substeps), drive.before, sample.values, sample.use, variances, nothing,
     )  # fmt: skip
     x, v, z, zeros = jnp.split(mean, [dof, 2 * dof, 2 * dof + plant.hidden])
@@ -252,9 +272,8 @@ def one_sample(
     after = advance_sample(plant, minv, motion, g, base, time, dt)
     x, v, z = ((a + b) / 2 for a, b in zip(motion[:3], after[:3], strict=True))
     free, rates = linearised(plant, minv, x, v, z, g[g.shape[0] // 2], time + dt / 2)
-    onward = _ramps(len(wandering))
     step = _beside(_transition(plant, minv, motion, after, rates, dt, substeps), onward)
-    moving = _product(_product(step, updated), step.T) + _beside(added, _about_slopes(wander[:, 1]))
+    moving = _product(_product(step, updated), step.T) + _beside(added, stirred)
     slope = with_friction(plant, minv, x, v, motion.mode, free, time + dt / 2)[0]
     overrun = _overrun(plant, motion, after, moving, slope, dt)
     covariance = _rest(plant, minv, moving, after.mode)
@@ -267,7 +286,7 @@ def one_sample(
 
 def _beside(a, b):
     """Two matrices on one diagonal."""
-    return a if not b.size else jax.scipy.linalg.block_diag(a, b)
+    return a if not b.size else b if not a.size else jax.scipy.linalg.block_diag(a, b)
 
 
 def _about_slopes(variances):
@@ -333,7 +352,7 @@ def _overrun(plant, before: Motion, after: Motion, covariance, slope, dt):
 
 
 def _update(
-    plant, minv, show, motion: Motion, zeros, wandering, covariance, overrun, load: Load, before, y, use, variances,
+    plant, minv, show, motion: Motion, zeros, of_zeros, covariance, overrun, load: Load, before, y, use, variances,
     nothing,
 ) -> tuple[Float[Array, " state"], Float[Array, "state state"], Innovations]:  # fmt: skip
     """State after the readings of one sample, and their innovations; `overrun` tells how surely links rest, `load` is
@@ -346,8 +365,8 @@ def _update(
     ]
     errors, spreads, shares = [], [], []
     for c in range(y.shape[0]):
-        gain, of_zeros = 1.0 + plant.channel_gain[c], _of_zeros(wandering, c)
-        reading = y[c] - jnp.sum(of_zeros * mean[size:])
+        gain, mine = 1.0 + plant.channel_gain[c], jnp.array([float(channel == c) for channel in of_zeros])
+        reading = y[c] - jnp.sum(mine * mean[size:])
         predicted, row, share = _predict(
             plant, minv, show, c, mean[:size], covariance[:size, :size], motion.mode, overrun, load, reading, use[c],
             variances[c], gain, nothing,
@@ -357,7 +376,7 @@ def _update(
             row = jnp.where(channel == c, rows[c], row)
             share = jnp.where(channel == c, 0.0, share)
         error = reading - gain * predicted - plant.channel_offset[c]
-        row = jnp.concatenate([gain * row, of_zeros])
+        row = jnp.concatenate([gain * row, mine])
         cross = jnp.sum(covariance * row[None, :], 1)
         spread = jnp.sum(row * cross) + variances[c]
         weight = use[c] * cross / spread
@@ -367,11 +386,6 @@ def _update(
         spreads.append(spread)
         shares.append(share)
     return mean, covariance, Innovations(jnp.stack(errors), jnp.stack(spreads), jnp.stack(shares))
-
-
-def _of_zeros(wandering: tuple[int, ...], channel: int):
-    """How a channel's reading depends on the zeros that wander, and on their slopes."""
-    return jnp.array([part for c in wandering for part in (float(c == channel), 0.0)])
 
 
 def _predict(plant, minv, show, c, mean, covariance, mode, overrun, load: Load, y, use, variance, gain, nothing):

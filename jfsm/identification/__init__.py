@@ -1,5 +1,6 @@
 """What values: the likelihood, what is known beforehand, and the fit."""
 
+from ._colour import Colour as Colour
 from ._fit import Fit as Fit
 from ._fit import fit as fit
 from ._fit import without_small_offsets as without_small_offsets

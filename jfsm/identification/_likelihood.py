@@ -33,6 +33,7 @@ from ..estimation._filter import (
     samples_of,
 )
 from ..estimation._imposed import force_innovations
+from ._colour import Colour
 from ._layout import with_vector
 
 _FEW = 32
@@ -116,6 +117,27 @@ def predictions(
     return _each(one, theta.shape[0])(floats, lanes, theta)
 
 
+@eqx.filter_jit
+def slope_by_colour(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, doubt, until, values, channels):
+    """Minus log-likelihood at `theta` (unknowns,) of one lane, and its gradient by the `values` of a `Colour` of these
+    channels."""
+    floats, fixed = eqx.partition(plant, eqx.is_inexact_array)
+    plant, lane = eqx.combine(jax.tree.map(lambda leaf: leaf[0], floats), fixed), jax.tree.map(lambda a: a[0], lanes)
+    counted = readings.use * (jnp.arange(readings.valid.size) < until)[:, None] * readings.valid[:, None]
+
+    def cost(values):
+        colour = Colour.of(values, channels)
+        seen, numbers = colour.on(readings), _numbers(lane, theta)
+        start, log_scale = _start(plant, numbers, seen, doubt)
+        stirred = colour.of_force(noise)
+        found = innovations(with_vector(plant, numbers), show, fine, seen, stirred, start, log_scale)
+        value = jnp.sum(counted * (found.error**2 / found.variance / 2 + jnp.log(found.variance) / 2 - found.log_share))
+        return value, value
+
+    slope, value = jax.jacfwd(cost, has_aux=True)(values)
+    return value, slope
+
+
 def _slopes_of_motion(
     plant: Plant, lanes: Lanes, theta, show, fine: Fine, readings, noise, doubt, *, one_kernel: bool
 ) -> tuple[_Seen, _Seen]:
@@ -150,7 +172,7 @@ def _slopes_of_motion(
             def onward(held, state, drive):
                 numbers, known = held
                 after, found = one_sample(
-                    with_vector(plant, numbers), known, show, noise, fine.step, readings.wandering,
+                    with_vector(plant, numbers), known, show, noise, fine.step, readings.zeros,
                     eqx.combine(state, modes), drive if late else drive._replace(force=force), sample,
                 )  # fmt: skip
                 after, modes_after = eqx.partition(after, eqx.is_inexact_array)

@@ -27,6 +27,7 @@ from ..dynamics._start import starting_state
 from ..estimation._filter import ProcessNoise, Readings
 from ..records import NoiseFloor, Record, clipped, declipped, noise_floor, quantisation_step, spikes, tones
 from ..structures import Structure
+from ._colour import Colour
 
 _LEAST_NOISE = 1e-4
 """Noise of a channel as a share of its size, at least: below it the integration error would be taken for physics."""
@@ -82,6 +83,8 @@ class Nuisances:
         First guess of the initial state; `at_rest` says that it is known.
     forgiven : float
         Share of the elastic force that no hypothesis has to explain: what all of them lack.
+    colour : Colour or None
+        Memory of the channels' noise, where it is known to have one.
     """
 
     record: Record
@@ -106,6 +109,7 @@ class Nuisances:
     notes: tuple[str, ...]
     path: Path | None = None
     forgiven: float = 0.0
+    colour: Colour | None = None
     _heads: dict[int, tuple[Fine | Imposed, Readings]] = field(default_factory=dict, init=False, repr=False)
 
     @property
@@ -133,6 +137,14 @@ class Nuisances:
     def judged(self) -> np.ndarray:
         """Which of the channels a hypothesis has to predict."""
         return np.array([channel in self.record.answers for channel in self.channels])
+
+    @property
+    def memories(self) -> dict[Channel, tuple[float, float]]:
+        """Correlation of the noise from sample to sample, and the share of its variance that has it, by channel."""
+        if self.colour is None:
+            return {}
+        pairs = zip(np.asarray(self.colour.memory).tolist(), np.asarray(self.colour.share).tolist(), strict=True)
+        return dict(zip((self.channels[c] for c in self.colour.channels), pairs, strict=True))
 
     @cached_property
     def coarse(self) -> np.ndarray:
@@ -175,6 +187,22 @@ class Nuisances:
         size, n = self.spread[list(channels)], self.samples
         wander = jnp.asarray(np.stack([(size / n) ** 2, 3 * size**2 / n**3], 1))
         return replace(self, readings=replace(self.readings, wander=wander, wandering=tuple(channels)))
+
+    def with_colour(self, colour: Colour) -> "Nuisances":
+        """The same record, its noise having this colour: no channel alone told how strong it is."""
+        picked, louder = list(colour.channels), float(colour.louder)
+        readings, floor, trusted = colour.on(self.readings), self.floor.copy(), self.trusted.copy()
+        floor[picked], trusted[picked] = np.sqrt(np.asarray(readings.variance)[picked]), False
+        return replace(
+            self,
+            readings=readings,
+            floor=floor,
+            trusted=trusted,
+            noise=colour.of_force(self.noise),
+            force_floor=self.force_floor * math.sqrt(louder),
+            force_variance=self.force_variance * louder,
+            colour=colour,
+        )
 
     def pushed(self, force: np.ndarray) -> Fine:
         """What drives the record, and another force (n, dof) as well."""

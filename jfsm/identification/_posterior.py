@@ -7,13 +7,15 @@ from dataclasses import dataclass, replace
 import jax
 import jax.numpy as jnp
 import numpy as np
+from scipy.optimize import minimize
 
 from ..dynamics._imposed import Imposed
 from ..dynamics._plant import Grid, Plant, hidden_width, numbers_of
 from ..estimation._filter import Innovations, ProcessNoise
 from ..structures import AbstractFriction, ChannelDelay, ForceDelay, Structure
+from ._colour import Colour
 from ._layout import plant_rows, plant_vector
-from ._likelihood import Lanes, derivatives, predictions
+from ._likelihood import Lanes, derivatives, predictions, slope_by_colour
 from ._nuisances import Nuisances
 from ._unknowns import Unknown, values_of
 
@@ -172,6 +174,49 @@ class Posterior:
         )
         n = nuisances.samples
         return Innovations(*(np.asarray(array)[0, :n] for array in found))  # pyright: ignore[reportArgumentType]
+
+    def colour(self, theta: np.ndarray, channels: Sequence[int], loudest: float) -> Colour:
+        """The most likely colour of the noise of these channels at `theta` (unknowns,) of a hypothesis with one start.
+
+        It is the same in all records. The noise of the force is up to `loudest` times as strong as it was taken to be.
+        """
+        scales = [u.path.startswith("noise@") for u in self.hypothesis.unknowns[0]]
+        quiet, picked, powers = np.where(scales, 0.0, theta), list(channels), []
+        for index, end in enumerate(self.until):
+            use = np.asarray(self.records[index].readings.use)[:end, picked]
+            error = np.where(use > 0, self.innovations(theta, index).error[:end, picked], 0.0)
+            powers.append(np.sum(error**2, 0) / np.maximum(np.sum(use, 0), 1))
+
+        def cost(values: np.ndarray) -> tuple[float, np.ndarray]:
+            found = [self._slope_by_colour(quiet, index, values, channels) for index in range(len(self.records))]
+            return sum(value for value, _ in found), np.sum([slope for _, slope in found], 0)
+
+        begin = Colour.begin(np.mean(powers, 0))
+        found = minimize(cost, begin, jac=True, method="L-BFGS-B", bounds=Colour.reach(begin, loudest))
+        return Colour.of(jnp.asarray(found.x), channels)
+
+    def _slope_by_colour(
+        self, theta: np.ndarray, index: int, values: np.ndarray, channels: Sequence[int]
+    ) -> tuple[float, np.ndarray]:
+        """Minus log-likelihood of a record at `theta`, and its gradient by the values of its noise's colour."""
+        nuisances, until, (plant, maps, mine) = self.records[index], self.until[index], self._parts[index]
+        inner = np.zeros(maps.unit.shape[1])
+        inner[: len(mine)] = theta[mine]
+        fine, readings = nuisances.head(until)
+        value, slope = slope_by_colour(
+            plant,
+            maps,
+            jnp.asarray(inner),
+            nuisances.show,
+            fine,
+            readings,
+            nuisances.noise,
+            _doubt(plant, nuisances),
+            jnp.asarray(until),
+            jnp.asarray(values),
+            tuple(channels),
+        )
+        return float(value), np.asarray(slope)
 
     def structure(self, theta: np.ndarray, lane: int = 0) -> Structure:
         """The structure with the values of one lane."""

@@ -12,5 +12,6 @@ from jfsm.records._noise_floor import noise_floor as noise_floor
 from jfsm.records._quantisation import quantisation_step as quantisation_step
 from jfsm.records._read import read as read
 from jfsm.records._record import Record as Record
+from jfsm.records._rolloff import rolloff as rolloff
 from jfsm.records._silence import silent_forces as silent_forces
 from jfsm.records._tones import tones as tones
