@@ -34,7 +34,6 @@ from tests.blind.arrays import rms  # noqa: E402
 from tests.blind.challenge import true_channels, trusted_motion  # noqa: E402
 from tests.blind.drives import DRIVES  # noqa: E402
 from tests.blind.plants import EscapeError  # noqa: E402
-from tests.blind.sensors import with_noise  # noqa: E402
 
 ALIKE = (
     "sine_stiffness", "square_stiffness", "cubic_hardening", "cubic_softening", "quintic_stiffness", "dead_zone",
@@ -101,8 +100,9 @@ def done(challenge: Challenge, proposal: Proposal) -> jfsm.Record:
     start = challenge.law.start(0.0, 0.0, challenge.truth.stiffness)
     motion = trusted_motion(challenge.truth, challenge.law, drive, start, grid, typical, 1e3 * challenge.motion.peak)
     kinds = [kind for kind, _ in record.channels]
-    clean = true_channels(drive, motion, kinds)
-    shown: dict[str, Any] = with_noise(np.random.default_rng(challenge.seed), clean, challenge.noise)
+    rng, shown = np.random.default_rng(challenge.seed), dict[str, Any]()
+    for kind, y in true_channels(drive, motion, kinds).items():  # a sensor is as noisy as it was, whatever it shows
+        shown[kind] = y + challenge.noise * rms(challenge.clean.get(kind, y)) * rng.standard_normal(y.size)
     return jfsm.Record(grid, **shown, units=dict(record.units), at_rest=record.at_rest)
 
 

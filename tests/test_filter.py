@@ -40,6 +40,8 @@ X0, V0 = np.array([0.2, -0.1]), np.array([0.0, 0.4])
 START_COVARIANCE = np.diag([0.02, 0.03, 0.05, 0.01])
 WANDER = np.array([[1e-4, 1e-6], [3e-5, 2e-6], [2e-3, 1e-5]])
 
+COLOUR = np.array([[0.9, 0.95], [0.5, 0.3], [0.99, 0.6]])
+
 
 def measured() -> tuple[np.ndarray, np.ndarray]:
     """Force (n, 2) and readings (n, channels): any will do, they need not be likely."""
@@ -57,6 +59,7 @@ def filtered(
     covariance=START_COVARIANCE,
     one_kernel=False,
     wandering: tuple[int, ...] = (),
+    coloured: tuple[int, ...] = (),
 ) -> Innovations:
     force, readings = measured()
     readings = readings if values is None else values
@@ -74,6 +77,8 @@ def filtered(
             jnp.asarray(np.arange(length) < N, dtype=jnp.float64),
             jnp.asarray(WANDER[list(wandering)]),
             wandering,
+            jnp.asarray(COLOUR[list(coloured)]),
+            coloured,
         ),
         ProcessNoise(jnp.asarray(PROCESS)),
         Start(jnp.asarray(x0), jnp.asarray(V0), jnp.asarray(covariance)),
@@ -169,6 +174,19 @@ def test_zeros_that_wander_are_slopes_that_change_at_random(wandering):
         whole[:, channel, :, channel] += begun * np.outer(sample, sample) + changed * since @ since.T
     law = multivariate_normal(mean, whole.reshape(3 * N, 3 * N))  # pyright: ignore[reportArgumentType]
     found = filtered(wandering=wandering)
+    assert log_likelihood(found, ALL) == pytest.approx(law.logpdf(measured()[1].ravel()), rel=1e-6)
+
+
+@pytest.mark.parametrize("coloured", [(0,), (2, 1)])
+def test_noise_with_a_memory_is_correlated_from_sample_to_sample(coloured):
+    mean, covariance = dense_law()
+    whole = covariance.reshape(N, 3, N, 3).copy()
+    apart, variance = np.abs(np.subtract.outer(np.arange(N), np.arange(N))), VARIANCE * np.exp(LOG_SCALE)
+    for channel in coloured:
+        memory, share = COLOUR[channel]
+        whole[:, channel, :, channel] += share * variance[channel] * (memory**apart - np.eye(N))
+    law = multivariate_normal(mean, whole.reshape(3 * N, 3 * N))  # pyright: ignore[reportArgumentType]
+    found = filtered(coloured=coloured)
     assert log_likelihood(found, ALL) == pytest.approx(law.logpdf(measured()[1].ravel()), rel=1e-6)
 
 

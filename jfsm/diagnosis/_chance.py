@@ -19,7 +19,7 @@ from ..structures import Clipping
 from ._adequacy import adequate, white
 from ._gain import remeasured
 from ._problem import Problem
-from ._trial import Prediction, Trial, ended, extent, free_run, predict, sets
+from ._trial import Prediction, Trial, ended, extent, free_run, predict, runs_away, sets
 
 _DRAWS = 6
 
@@ -33,7 +33,7 @@ def beside_chance(trials: Sequence[Trial], problem: Problem, key: jax.Array) -> 
         return list(trials)
     posterior = problem.posterior_of(best)
     runs = [free_run(posterior, best.theta, index) for index in range(len(records))]
-    if not all(np.all(np.isfinite(run)) for run in runs):
+    if any(map(runs_away, runs, records)):
         return list(trials)
     levels = [noise_levels(best, n, index) for index, n in enumerate(records)]
     seeds = np.asarray(jax.random.key_data(key)).astype(np.uint32).tolist()

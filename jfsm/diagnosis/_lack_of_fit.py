@@ -13,7 +13,7 @@ from ..dynamics._plant import direction
 from ..identification import Posterior, missing_force
 from ._problem import Problem
 from ._score import moved, regressed
-from ._trial import Trial, free_run
+from ._trial import Trial, free_run, runs_away
 
 _DEGREE = 5
 """Of the polynomials in displacement and velocity."""
@@ -59,7 +59,7 @@ def _unfit(trial: Trial, problem: Problem) -> Unfit:
     posterior = problem.posterior_of(trial)
     links = list(dict.fromkeys(law.at for law in trial.laws)) or list(trial.structure.links)
     runs = [free_run(posterior, trial.theta, index) for index in range(len(posterior.records))]
-    if not all(np.all(np.isfinite(run)) for run in runs):
+    if any(map(runs_away, runs, posterior.records)):
         return Unfit(0.0, strays=np.inf)
     shapes = _shapes(trial, posterior, links, runs)
     parts = [moved(trial, posterior, index, shape) for index, shape in enumerate(shapes)]

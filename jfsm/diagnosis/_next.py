@@ -1,7 +1,8 @@
 """What to measure next: the test that tells two rivals apart.
 
 Each rival in turn is taken to be right. A test is simulated with it, noise included, and both are fitted to what the
-sensors would show: the difference of their log-evidences is what the test is expected to say. The lesser of the two
+sensors would show: the difference of their log-evidences is what the test is expected to say. It is the mean of that
+with a draw of noise and with its opposite, in which most of what chance adds cancels. The lesser of the two rivals'
 counts, for which of them is right is not known.
 """
 
@@ -30,10 +31,12 @@ from ._trial import Trial
 
 RIVAL = 0.02
 """Probability from which another explanation is a rival."""
-_LEVELS, _SPEEDS, _SHIFTS = (0.25, 0.5, 2.0, 4.0), (0.7, 1.4), (0.5, -0.5)
+_LEVELS, _SPEEDS, _SHIFTS = (0.25, 0.5, 2.0, 4.0), (0.35, 0.7, 1.4), (0.5, -0.5)
 """How much larger and faster the drive of a test may be, and a constant force beside it in its rms."""
-_LONGER, _PLENTY = 4, 20.0
-"""How much longer the best test is proposed as well, and the nats from which it is long enough."""
+_LONGER, _PLENTY, _LONGEST = (4, 16), 20.0, 50_000
+"""How much longer the best test is proposed as well, the nats from which it is long enough, and its samples at most."""
+_SAFELY = 1.25
+"""How much louder a drive may be than it is meant to be, and no rival runs away."""
 _SIDE = 21
 """States to a side on which forces are compared,"""
 _SAME = 0.02
@@ -155,21 +158,29 @@ def proposals(leading: Leading, key: jax.Array, tell: Callable[[str, int, int], 
     for done, test in enumerate(tests):
         found += [(proposal, test) for proposal in tried(test, done)]
     if found and record.driven and record.drive == "force":
-        best, test = max(found, key=lambda one: one[0].nats)
-        longer = replace(test, length=_LONGER)
-        found += [(p, longer) for p in tried(longer, len(tests))] if best.nats < _PLENTY else []
+        for length in _LONGER:
+            best, test = max(found, key=lambda one: one[0].nats)
+            if best.nats >= _PLENTY or length * leading.samples > _LONGEST:
+                break
+            longer = replace(test, length=length)
+            found += [(proposal, longer) for proposal in tried(longer, len(tests) + length)]
     return sorted((proposal for proposal, _ in found), key=lambda p: -p.nats)
 
 
 def _tried(leading: Leading, test: Variation, words: str, key: jax.Array) -> list[Proposal]:
     """A test as a proposal, or nothing where a rival runs away in it."""
     seeds = np.random.default_rng(np.asarray(jax.random.key_data(key)).astype(np.uint32).tolist()).spawn(2)
-    records = [_made(leading, test, truth, seed) for truth, seed in zip(leading.rivals, seeds, strict=True)]
-    (clean, first), (_, second) = records
-    if clean is None or first is None or second is None:
+    one, other = (_made(leading, test, truth, seed) for truth, seed in zip(leading.rivals, seeds, strict=True))
+    if not one or not other:
         return []
-    nats = min(separation(leading, first), -separation(leading, second))
-    return [Proposal(words, nats, _reach(leading, clean), (leading.rivals[0].name, leading.rivals[1].name), clean)]
+    nats = min(_expected(leading, one), -_expected(leading, other))
+    names = leading.rivals[0].name, leading.rivals[1].name
+    return [Proposal(words, nats, _reach(leading, one[0]), names, one[0])]
+
+
+def _expected(leading: Leading, made: Sequence[Record]) -> float:
+    """Nats that the noisy ones of the records speak for the first of the rivals, in the mean."""
+    return float(np.mean([separation(leading, record) for record in made[1:]]))
 
 
 def same_force(one: Trial, other: Trial, nuisances: Nuisances) -> bool:
@@ -214,23 +225,34 @@ def _evidence(model: Structure, nuisances: Nuisances, rival: Trial) -> float:
     return finish(posterior, approach(posterior, LADDER[-1:])).evidence(0)
 
 
-def _made(
-    leading: Leading, test: Variation, truth: Trial, rng: np.random.Generator
-) -> tuple[Record, Record] | tuple[None, None]:
-    """The test's record had `truth` been right, without noise and with."""
-    nuisances = leading.nuisances
-    plan = _plan(nuisances.record[: leading.samples], test)
-    structure = truth.extended()
-    state = None if plan.driven else _start(truth, nuisances, test.level)
-    response = simulate(structure, plan, state, reconstruction=nuisances.reconstruction, solver="grid")
-    if response.result != Result.successful:
-        return None, None
+def _made(leading: Leading, test: Variation, truth: Trial, rng: np.random.Generator) -> tuple[Record, ...]:
+    """The test's record had `truth` been right: without noise, with it, and with its opposite.
+
+    Nothing where the structure runs away, or would if it were driven somewhat harder.
+    """
+    nuisances, structure = leading.nuisances, truth.extended()
+
+    def followed(test: Variation):
+        plan = _plan(nuisances.record[: leading.samples], test)
+        state = None if plan.driven else _start(truth, nuisances, test.level)
+        return plan, simulate(structure, plan, state, reconstruction=nuisances.reconstruction, solver="grid")
+
+    plan, response = followed(test)
+    known = replace(test, kind="") == Variation()
+    harder = response if known else followed(replace(test, level=_SAFELY * test.level, length=1))[1]
+    if not response.result == harder.result == Result.successful:
+        return ()
     shown = response.readings(plan)
     levels = noise_levels(truth, nuisances)
     share = float(np.median([levels[c] / s for c, s in zip(nuisances.channels, nuisances.spread, strict=True)]))
     levels |= {channel: share * float(np.std(y)) for channel, y in shown.items() if channel not in levels}
     clean = {channel: shown.get(channel, y) for channel, y in plan.channels.items()}
-    return remeasured(plan, clean, {}, rng), remeasured(plan, clean, levels, rng)
+    seed = int(rng.integers(2**63))
+    noisy = [
+        remeasured(plan, clean, {c: sign * level for c, level in levels.items()}, np.random.default_rng(seed))
+        for sign in (1.0, -1.0)
+    ]
+    return remeasured(plan, clean, {}, rng), *noisy
 
 
 def _plan(record: Record, test: Variation) -> Record:

@@ -184,21 +184,20 @@ class Study:
         behind, refitted = found.behind, refit_from(found.trials, refitted, problem)
         louder, (given, refitted, *trials) = self._amid_noise(given, refitted, found.trials, problem)
         lack, alone = LackOfFit(problem), told([given, refitted, *trials])
-        channel = wandering(max(alone, key=lambda t: t.evidence), problem, SLOWLY)
-        if channel is not None:
-            return problem.with_wandering(channel)
-        other = coloured(max(alone, key=lambda t: t.evidence), problem)
-        if other is not None:
+        best = max(alone, key=lambda t: t.evidence)
+        if (other := coloured(best, problem)) is not None:  # noise that remembers is in part slow as well
             return other
+        if (channel := wandering(best, problem, SLOWLY)) is not None:
+            return problem.with_wandering(channel)
         effects = _beside(alone, refitted, every, lack, imposed=problem.imposed) if self.pairs else []
         if effects:
-            found = self._slightly_late(max(alone, key=lambda t: t.evidence), effects, problem)
+            found = self._slightly_late(best, effects, problem)
             found = found or search_pairs(effects, trials, known, refitted, problem, self.tell)
             trials = best_of_each([*trials, *(t.beside(refitted).amid(louder) for t in found.trials)])
             trials = [given, refitted, *trials]
             given, refitted, *trials = beside_chance(trials, problem, self.key)
-            other = coloured(max(told([given, refitted, *trials]), key=lambda t: t.evidence), problem)
-            if other is not None:
+            best = max(told([given, refitted, *trials]), key=lambda t: t.evidence)
+            if (other := coloured(best, problem)) is not None:
                 return other
             done = {t.effects for t in trials}
             behind = [one for one in (*behind, *found.behind) if one.effects not in done]

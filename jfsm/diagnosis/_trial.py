@@ -228,6 +228,11 @@ def free_run(posterior: Posterior, theta: np.ndarray, index: int) -> np.ndarray:
     return np.asarray(nuisances.readings.values)[: nuisances.samples] - free.error
 
 
+def runs_away(run: np.ndarray, nuisances: Nuisances) -> bool:
+    """Whether readings (n, channels) of a free run leave all bounds."""
+    return not bool(np.all(np.abs(run) < _RUN_AWAY * nuisances.spread))
+
+
 def windows(nuisances: Nuisances) -> tuple[np.ndarray, np.ndarray]:
     """Which samples the filter uses, and which it predicts freely: all of them along an imposed motion."""
     if nuisances.path is not None:

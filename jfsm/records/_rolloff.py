@@ -25,7 +25,7 @@ class Rolloff(NamedTuple):
 
 
 def rolloff(y: ArrayLike) -> Rolloff:
-    """Of one channel (n,).
+    """How the spectrum of one channel (n,) falls; of a dead one nothing is told.
 
     Notes
     -----
@@ -41,7 +41,8 @@ def rolloff(y: ArrayLike) -> Rolloff:
     phase = np.linspace(0.0, np.pi, power.size)
     upper = slice(power.size // 4, -1)
     power, shape = power[upper], 1.0 / (2.0 - 2.0 * np.cos(phase[upper]))
+    if not np.any(power):
+        return Rolloff(0.0, 0.0)
     walk = float(np.mean(power / shape))
-    tiny = np.finfo(float).tiny
-    white, walking = np.log(max(np.mean(power), tiny)), np.log(max(walk, tiny)) + np.mean(np.log(shape))
+    white, walking = np.log(np.mean(power)), np.log(walk) + np.mean(np.log(shape))
     return Rolloff(float(power.size * (white - walking) / _BESIDE), walk)
