@@ -10,7 +10,8 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 import jfsm
-from jfsm.diagnosis._next import Leading, Variation, _tried, same_force
+from jfsm._result import Result
+from jfsm.diagnosis._next import Leading, Variation, _made, _plan, _tried, same_force
 from jfsm.identification import prepare
 
 MASS, STIFFNESS, DAMPING = 1.0, 40.0, 0.5
@@ -61,12 +62,39 @@ def test_the_same_key_proposes_the_same(undecided):
     assert _tried(one, Variation(level=2.0), "", key)[0].nats == _tried(again, Variation(level=2.0), "", key)[0].nats
 
 
+def test_noise_comes_with_its_opposite(undecided):
+    leading = undecided.leading
+    made = _made(leading, Variation(level=2.0), leading.rivals[0], np.random.default_rng(0))
+    clean, one, other = (np.column_stack(list(record.channels.values())) for record in made)
+    np.testing.assert_allclose((one + other) / 2, clean, rtol=1e-9, atol=1e-9)
+    assert np.all(np.std(one - clean, 0) > 0)
+
+
+def test_a_test_in_which_a_rival_might_run_away_is_none(undecided):
+    leading = undecided.leading
+    softening = next(t for t in leading.rivals if t.name == "cubic_softening")
+
+    def follows(level: float) -> bool:
+        plan = _plan(leading.nuisances.record[: leading.samples], Variation(level=level))
+        return jfsm.simulate(softening.extended(), plan, solver="grid").result == Result.successful
+
+    level = 1.0
+    while follows(1.1 * level):
+        level *= 1.1
+    assert level > 2.0
+    rng = np.random.default_rng(0)
+    assert not _made(leading, Variation(level=level), softening, rng)
+    assert _made(leading, Variation(level=level / 1.6), softening, rng)
+
+
 def test_where_no_test_tells_much_the_best_is_proposed_longer_and_tells_more(undecided, monkeypatch):
     monkeypatch.setattr(Leading, "tests", lambda leading: [Variation(speed=0.7), Variation(level=0.9)])
     found = undecided.next_tests()
     lengths = [len(p.record) for p in found]
-    assert len(found) == 3 and max(lengths) == lengths[0] == 4 * min(lengths)
-    assert found[0].nats > found[1].nats and found[0].what.endswith(", there and back until it is 4 times as long")
+    assert 3 <= len(found) <= 4 and max(lengths) == lengths[0] == 4 ** (len(found) - 2) * min(lengths)
+    assert found[0].nats > found[1].nats and found[0].what.endswith(
+        f"until it is {lengths[0] // min(lengths)} times as long"
+    )
     force = found[0].record.force
     assert force is not None
     np.testing.assert_array_equal(force, np.concatenate([half := force[: len(force) // 2], half]))
