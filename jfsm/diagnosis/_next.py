@@ -2,8 +2,8 @@
 
 Each rival in turn is taken to be right. A test is simulated with it, noise included, and both are fitted to what the
 sensors would show: the difference of their log-evidences is what the test is expected to say. It is the mean of that
-with a draw of noise and with its opposite, in which most of what chance adds cancels. The lesser of the two rivals'
-counts, for which of them is right is not known.
+with a draw of noise and with its opposite, in which most of what chance adds cancels, and of both rivals, for which of
+them is right is not known: against a law that holds the right one as a special case no test says much.
 """
 
 import math
@@ -53,7 +53,9 @@ class Proposal:
     what : str
         The test in words.
     nats : float
-        Difference of the rivals' log-evidences on its record alone, at least.
+        Difference of the rivals' log-evidences on its record alone, in the mean of both as the truth.
+    least : float
+        The same for that of the two for which it says less.
     reach : float
         Largest response to be expected, as a multiple of that in the record at hand.
     rivals : (str, str)
@@ -64,6 +66,7 @@ class Proposal:
 
     what: str
     nats: float
+    least: float
     reach: float
     rivals: tuple[str, str]
     record: Record
@@ -173,9 +176,12 @@ def _tried(leading: Leading, test: Variation, words: str, key: jax.Array) -> lis
     one, other = (_made(leading, test, truth, seed) for truth, seed in zip(leading.rivals, seeds, strict=True))
     if not one or not other:
         return []
-    nats = min(_expected(leading, one), -_expected(leading, other))
+    each = _expected(leading, one), -_expected(leading, other)
+    least = min(each)
+    # A truth that loses on its own record did not find back to its numbers: what the other has gained there is nothing.
+    nats = float(np.mean(each)) if least > -SIGNIFICANT else least
     names = leading.rivals[0].name, leading.rivals[1].name
-    return [Proposal(words, nats, _reach(leading, one[0]), names, one[0])]
+    return [Proposal(words, nats, least, _reach(leading, one[0]), names, one[0])]
 
 
 def _expected(leading: Leading, made: Sequence[Record]) -> float:
