@@ -224,8 +224,8 @@ def test_a_bar_is_shown_on_a_terminal_only(channels, folder, monkeypatch):
 def test_what_to_measure_next_is_said_after_the_verdict(nats, last, channels, folder, monkeypatch):
     record, rivals = read(*channels[:1], force="u", displacement="y"), ("coulomb", "lugre")
     tests = [] if nats is None else [
-        Proposal("the same force at 2 times the size", nats, 1.87, rivals, record),
-        Proposal("the same force at 0.5 times the size", -1.0, 0.5, rivals, record),
+        Proposal("the same force at 2 times the size", nats, nats, 1.87, rivals, record),
+        Proposal("the same force at 0.5 times the size", -1.0, -1.0, 0.5, rivals, record),
     ]  # fmt: skip
     d = FakeDiagnosis(verdict="cause", next_tests=lambda key, progress: tests)
     monkeypatch.setattr("jfsm.diagnosis.diagnose", lambda *arguments, **options: d)

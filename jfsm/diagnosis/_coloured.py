@@ -20,6 +20,7 @@ _CORRELATED = 0.02
 _CHANCE = 5.0
 """or so many of its standard deviations."""
 _MOSTLY = 0.5
+"""Share of a force's noise that is left where the structure moves, at least, where the force is not a few tones."""
 
 
 def coloured(beside: Trial, problem: Problem) -> Problem | None:

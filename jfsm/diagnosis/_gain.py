@@ -281,10 +281,10 @@ def remeasured(
     """
     kinds: dict[str, Any] = {}
     for (kind, j), y in truth.items():
-        memory, share = (memories or {}).get((kind, j), (0.0, 0.0))
-        noise = math.sqrt(1 - share) * rng.standard_normal(y.size) + math.sqrt(share) * _remembering(
-            y.size, memory, rng
-        )
+        noise = rng.standard_normal(y.size)
+        if memories and (kind, j) in memories:
+            memory, share = memories[kind, j]
+            noise = math.sqrt(1 - share) * noise + math.sqrt(share) * _remembering(y.size, memory, rng)
         kinds.setdefault(kind, {})[j] = y + levels.get((kind, j), 0.0) * noise
     return Record(
         record.time, **kinds, base_acceleration=record.base_acceleration, at_rest=record.at_rest, drive=record.drive
