@@ -5,11 +5,21 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import jfsm
 from jfsm.diagnosis._akin import resting
 from jfsm.diagnosis._begin import Begin, Start
-from jfsm.diagnosis._candidates import Candidate, candidates, chosen_causes, contained, hypothesis, own_paths
+from jfsm.diagnosis._candidates import (
+    Candidate,
+    Laws,
+    candidates,
+    chosen_causes,
+    contained,
+    hypothesis,
+    own_paths,
+    promising,
+)
 from jfsm.diagnosis._effect import Effect
 from jfsm.identification import Nuisances, prepare
 
@@ -97,3 +107,39 @@ def test_a_quadratic_spring_about_a_rest_that_nothing_tells_is_a_well_of_two(cha
         assert case.begin.keys() == {("x0@1", None), ("mass@1", None)}
         assert case.begin["x0@1", None] == (pytest.approx(rest), pytest.approx(rest))
         assert case.begin["mass@1", None] == begin["mass@1", None]
+
+
+@pytest.mark.parametrize(("channel", "tried"), [("acceleration", True), ("displacement", False)])
+def test_a_mass_that_goes_from_well_to_well_begins_in_one_of_them(channel: str, tried: bool):
+    """Its owner knows the spring of a well, and no channel where that is."""
+    slope, curvature = 3.0, 1.2
+    time, omegas = np.arange(2000) * 0.08, np.linspace(0.3, 4.5, 20)
+    phases = np.random.default_rng(0).uniform(0.0, 2 * np.pi, 20)
+
+    def force(t):
+        return 0.55 * np.cos(np.multiply.outer(t, omegas) + phases).sum(-1)
+
+    def motion(t, y):
+        return [y[1], force(t) - 0.1 * y[1] + slope * y[0] - curvature * y[0] ** 3]
+
+    y = solve_ivp(motion, (0, time[-1]), [np.sqrt(slope / curvature), 0.0], t_eval=time, rtol=1e-9, atol=1e-12).y
+    assert np.count_nonzero(np.diff(np.sign(y[0]))) > 8
+    shown = y[0] if channel == "displacement" else motion(time, y)[1]
+    noisy = shown + 0.01 * np.std(shown) * np.random.default_rng(1).standard_normal(time.size)
+    model = jfsm.Structure.sdof(1.0, 2.05 * slope, 0.11)
+    effect = Effect(jfsm.causes()["double_well"], (0, 1))
+    found = Laws(model, prepare(jfsm.Record(time, force(time), **{channel: noisy}), model)).between_rests(effect, 0.1)
+    assert bool(found) == tried
+    for c in found:
+        k_neg, k3 = (float(q) for q in c.starts[0].terms[-1].values)
+        assert k_neg == pytest.approx(3 * slope, rel=0.1) and k3 == pytest.approx(curvature, rel=0.6)
+        assert c.begin is not None and c.share == 0.1
+        assert abs(c.begin["x0@1", None].value) == pytest.approx(np.sqrt(slope / curvature), rel=0.3)
+
+
+def test_a_law_that_begins_in_several_places_takes_no_place_of_another():
+    laws = [Effect(cause, (0, 1)) for cause in list(jfsm.causes().values())[:9]]
+    model = jfsm.Structure.sdof(1.0, 1.0, 0.1)
+    alone = [Candidate((effect,), (model,), 0.9 - 0.1 * i) for i, effect in enumerate(laws)]
+    chosen, left = promising([*alone, *[Candidate((laws[0],), (model,), 0.9)] * 5])
+    assert len({c.effects for c in chosen}) == 8 and [c.effects for c in left] == [(laws[8],)]

@@ -13,10 +13,12 @@ from .._threads import side_by_side
 from ..identification import (
     DEGREES,
     DEGREES_BESIDE,
+    LANES,
     Hypothesis,
     Nuisances,
     Placed,
     PlacedTogether,
+    Posterior,
     Unknown,
     about_a_rest,
     effect_unknown,
@@ -29,6 +31,7 @@ from ..identification import (
     place,
     place_together,
     scale_of,
+    with_a_rest,
     with_offsets,
 )
 from ..structures import (
@@ -56,6 +59,10 @@ A softening spring that outweighs the elastic one at a peak would let the motion
 """
 _START_LATE = 0.5
 """Second guess of a delay, in radians of the motion."""
+_WELLS = 2.0 ** (np.arange(-1, 7) / 2)
+"""How far from the middle two wells are, in one and a half sizes of the motion,"""
+_SEEN_FROM = (0.03, 0.01)
+"""and the shares of unmodelled force beside which the likeliest of them are chosen."""
 
 
 _MODEST = 0.02
@@ -153,7 +160,11 @@ def _spots(cause: Cause, model: Structure, places: Sequence[tuple] | None) -> li
 
 def promising(tried: Sequence[Candidate]) -> tuple[list[Candidate], list[Candidate]]:
     """Candidates that are worth a fit, and those that are not: laws that explain least of the missing force."""
-    ranked = sorted((c.share for c in tried if c.share is not None), reverse=True)
+    shares = dict[tuple[Effect, ...], float]()
+    for c in tried:
+        if c.share is not None:
+            shares[c.effects] = max(c.share, shares.get(c.effects, -math.inf))
+    ranked = sorted(shares.values(), reverse=True)
     least = ranked[_FOLLOWED - 1] if len(ranked) > _FOLLOWED else -math.inf
     chosen = [c for c in tried if c.starts and (c.share is None or c.share >= least)]
     fitted = {c.effects for c in chosen}
@@ -222,7 +233,8 @@ class Laws:
 
     def of(self, effect: Effect) -> list[Candidate]:
         """The law from where it explains most, and where it may rest elsewhere, from there."""
-        return [self.candidate(effect), *self.about_a_rest(effect)]
+        found = self.candidate(effect)
+        return [found, *self.about_a_rest(effect), *self.between_rests(effect, found.share)]
 
     def candidate(self, effect: Effect) -> Candidate:
         placed = self.placed(effect)
@@ -253,6 +265,36 @@ class Laws:
             return []
         placed, rest = found
         return [Candidate((effect,), (self.structure + placed.term,), placed.share, at_rest(effect.at, rest))]
+
+    def between_rests(self, effect: Effect, share: float | None) -> list[Candidate]:
+        """A law of two wells whose spring there is the model's, beginning in one of them, where no channel tells where
+        the motion is: smoothed, one from well to well stays in the middle.
+
+        Of wells so far apart that the record makes it likeliest.
+        """
+        stiffness = self.structure.stiffness_of(effect.at)
+        if stiffness <= 0 or not may_rest_anywhere(self.structure, self.nuisances):
+            return []
+        bends = [side * stiffness / (width * self.nuisances.length) for width in _WELLS for side in (1.0, -1.0)]
+        wells = [with_a_rest(effect.cause.effect, effect.at, stiffness, 0.0, bend) for bend in bends]
+        tried = [
+            Candidate((effect,), (self.structure + term,), share, at_rest(effect.at, rest))
+            for term, rest in (well for well in wells if well is not None)
+        ]
+        found = {int(np.argmin(costs)) for costs in self._costs(tried)} if tried else set()
+        return [tried[i] for i in sorted(found)]
+
+    def _costs(self, tried: Sequence[Candidate]) -> np.ndarray:
+        """Minus the logarithms of the posteriors with which candidates (shares of unmodelled force, candidates)
+        begin."""
+        nuisances, costs = self.nuisances.resolving([c.starts[0] for c in tried]), []
+        for i in range(0, len(tried), LANES):
+            few = tried[i : i + LANES]
+            begins = [c.begin for c in few]
+            posed = hypothesis(self.structure, [c.starts[0] for c in few], [nuisances], begins=begins)
+            posterior = Posterior(posed, [nuisances])
+            costs.append([posterior.evaluate(posterior.initial(), slack, first=True)[0] for slack in _SEEN_FROM])
+        return np.nan_to_num(np.concatenate(costs, 1), nan=np.inf)
 
 
 def _shows(effect: type, kind: str, records: Sequence[Nuisances]) -> bool:
