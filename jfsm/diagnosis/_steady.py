@@ -22,7 +22,12 @@ _LASTS = 0.8
 
 
 def unsteady(t: Trial, problem: Problem) -> list[str]:
-    """When records are predicted far worse than in the rest of their time, in words."""
+    """When records are predicted far worse than in the rest of their time, in words.
+
+    Nothing is said of a structure with several rests: on the hill between them a small error grows by itself.
+    """
+    if any(term.rests(t.structure.stiffness_of(term.at)) for term in t.structure.terms):
+        return []
     posterior, words = problem.posterior_of(t), []
     for index, nuisances in enumerate(problem.records):
         use, free = windows(nuisances)
