@@ -84,7 +84,7 @@ def test_a_test_in_which_a_rival_might_run_away_is_none(undecided):
     assert level > 2.0
     rng = np.random.default_rng(0)
     assert not _made(leading, Variation(level=level), softening, rng)
-    assert _made(leading, Variation(level=level / 1.6), softening, rng)
+    assert _made(leading, Variation(level=level / 1.8), softening, rng)
 
 
 def test_where_no_test_tells_much_the_best_is_proposed_longer_and_tells_more(undecided, monkeypatch):

@@ -24,6 +24,7 @@ from ..records import Record
 from ..structures import AbstractTerm, Structure
 from ._adequacy import SIGNIFICANT
 from ._begin import found_in, own_part
+from ._candidates import at_rest
 from ._chance import noise_levels
 from ._gain import remeasured
 from ._problem import Problem
@@ -35,7 +36,7 @@ _LEVELS, _SPEEDS, _SHIFTS = (0.25, 0.5, 2.0, 4.0), (0.35, 0.7, 1.4), (0.5, -0.5)
 """How much larger and faster the drive of a test may be, and a constant force beside it in its rms."""
 _LONGER, _PLENTY, _LONGEST = (4, 16), 20.0, 50_000
 """How much longer the best test is proposed as well, the nats from which it is long enough, and its samples at most."""
-_SAFELY = 1.25
+_SAFELY = 1.5
 """How much louder a drive may be than it is meant to be, and no rival runs away."""
 _SIDE = 21
 """States to a side on which forces are compared,"""
@@ -177,6 +178,8 @@ def _tried(leading: Leading, test: Variation, words: str, key: jax.Array) -> lis
     if not one or not other:
         return []
     each = _expected(leading, one), -_expected(leading, other)
+    if not np.all(np.isfinite(each)):
+        return []
     least = min(each)
     # A truth that loses on its own record did not find back to its numbers: what the other has gained there is nothing.
     nats = float(np.mean(each)) if least > -SIGNIFICANT else least
@@ -223,11 +226,12 @@ def separation(leading: Leading, record: Record) -> float:
 
 
 def _evidence(model: Structure, nuisances: Nuisances, rival: Trial) -> float:
-    """Log-evidence of a rival on another record, from where the one at hand left its numbers."""
-    start = rival.effects_on(model)
+    """Log-evidence of a rival on another record, from where the one at hand left its numbers, in either well."""
+    start, own = rival.effects_on(model), own_part(found_in(rival))
     lanes = lanes_of(start)
+    begins = [{**own, **at_rest(at, rest)} for at, rest in _rests(start)] if not nuisances.at_rest else []
     problem = Problem(model, [nuisances], [nuisances.samples]).resolving([start])
-    posterior = problem.posterior([start] * lanes, [own_part(found_in(rival))] * lanes)
+    posterior = problem.posterior([start] * lanes, [*begins, *[own] * lanes][:lanes])
     return finish(posterior, approach(posterior, LADDER[-1:])).evidence(0)
 
 
@@ -236,11 +240,15 @@ def _made(leading: Leading, test: Variation, truth: Trial, rng: np.random.Genera
 
     Nothing where the structure runs away, or would if it were driven somewhat harder.
     """
-    nuisances, structure = leading.nuisances, truth.extended()
+    nuisances, structure, rests = leading.nuisances, truth.extended(), _rests(truth.extended())
+    sure = not any(_rests(rival.structure) for rival in leading.rivals)
 
     def followed(test: Variation):
-        plan = _plan(nuisances.record[: leading.samples], test)
+        plan = _plan(nuisances.record[: leading.samples], test, known=sure)
         state = None if plan.driven else _start(truth, nuisances, test.level)
+        if plan.driven and rests:  # what is buckled rests in one of its wells
+            (_, stretched), rest = rests[0]
+            state = np.array([rest if stretched == 1 else -rest]), np.zeros(1)
         return plan, simulate(structure, plan, state, reconstruction=nuisances.reconstruction, solver="grid")
 
     plan, response = followed(test)
@@ -261,8 +269,17 @@ def _made(leading: Leading, test: Variation, truth: Trial, rng: np.random.Genera
     return remeasured(plan, clean, {}, rng), *noisy
 
 
-def _plan(record: Record, test: Variation) -> Record:
-    """Time and drive of a test, from rest where anything drives, with channels that hold nothing yet."""
+def _rests(structure: Structure) -> list[tuple[tuple[int, int], float]]:
+    """Stretches of links, other than none, at which a structure of one mass may rest."""
+    laws = structure.terms if structure.dof == 1 else ()
+    return [(law.at, rest) for law in laws for rest in law.rests(structure.stiffness_of(law.at))]
+
+
+def _plan(record: Record, test: Variation, *, known: bool = True) -> Record:
+    """Time and drive of a test, from rest where anything drives, with channels that hold nothing yet.
+
+    Where it rests is not `known` where that may be in one well or another.
+    """
     time = record.time[0] + record.dt * np.arange(test.length * len(record)) / test.speed
 
     def lasting(y: np.ndarray) -> np.ndarray:
@@ -278,7 +295,7 @@ def _plan(record: Record, test: Variation) -> Record:
     base = record.base_acceleration
     if base is not None:
         channels["base_acceleration"] = lasting(test.level * base)
-    return Record(time, **channels, at_rest=record.driven, drive=record.drive, units=dict(record.units))
+    return Record(time, **channels, at_rest=record.driven and known, drive=record.drive, units=dict(record.units))
 
 
 def _start(truth: Trial, nuisances: Nuisances, level: float) -> tuple[np.ndarray, np.ndarray]:
