@@ -2,8 +2,9 @@
 
 Each rival in turn is taken to be right. A test is simulated with it, noise included, and both are fitted to what the
 sensors would show: the difference of their log-evidences is what the test is expected to say. It is the mean of that
-with a draw of noise and with its opposite, in which most of what chance adds cancels, and of both rivals, for which of
-them is right is not known: against a law that holds the right one as a special case no test says much.
+with a draw of noise and with its opposite, in which most of what chance adds cancels. Which of the rivals is right is
+not known, and against a law that holds the right one as a special case no test says much: the geometric mean of what it
+says for either counts.
 """
 
 import math
@@ -35,7 +36,8 @@ RIVAL = 0.02
 _LEVELS, _SPEEDS, _SHIFTS = (0.25, 0.5, 2.0, 4.0), (0.35, 0.7, 1.4), (0.5, -0.5)
 """How much larger and faster the drive of a test may be, and a constant force beside it in its rms."""
 _LONGER, _PLENTY, _LONGEST = (4, 16), 20.0, 50_000
-"""How much longer the best test is proposed as well, the nats from which it is long enough, and its samples at most."""
+"""How much longer the best test is proposed as well, the nats, at least, from which it is long enough, and its samples
+at most."""
 _SAFELY = 1.5
 """How much louder a drive may be than it is meant to be, and no rival runs away."""
 _SIDE = 21
@@ -54,9 +56,9 @@ class Proposal:
     what : str
         The test in words.
     nats : float
-        Difference of the rivals' log-evidences on its record alone, in the mean of both as the truth.
+        Difference of the rivals' log-evidences on its record alone: geometric mean of that with either as the truth.
     least : float
-        The same for that of the two for which it says less.
+        That with the one for which it says less.
     reach : float
         Largest response to be expected, as a multiple of that in the record at hand.
     rivals : (str, str)
@@ -164,7 +166,7 @@ def proposals(leading: Leading, key: jax.Array, tell: Callable[[str, int, int], 
     if found and record.driven and record.drive == "force":
         for length in _LONGER:
             best, test = max(found, key=lambda one: one[0].nats)
-            if best.nats >= _PLENTY or length * leading.samples > _LONGEST:
+            if best.least >= _PLENTY or length * leading.samples > _LONGEST:
                 break
             longer = replace(test, length=length)
             found += [(proposal, longer) for proposal in tried(longer, len(tests) + length)]
@@ -181,8 +183,7 @@ def _tried(leading: Leading, test: Variation, words: str, key: jax.Array) -> lis
     if not np.all(np.isfinite(each)):
         return []
     least = min(each)
-    # A truth that loses on its own record did not find back to its numbers: what the other has gained there is nothing.
-    nats = float(np.mean(each)) if least > -SIGNIFICANT else least
+    nats = math.sqrt(each[0] * each[1]) if least > 0 else least
     names = leading.rivals[0].name, leading.rivals[1].name
     return [Proposal(words, nats, least, _reach(leading, one[0]), names, one[0])]
 
