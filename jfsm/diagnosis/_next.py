@@ -183,7 +183,8 @@ def _tried(leading: Leading, test: Variation, words: str, key: jax.Array) -> lis
     if not np.all(np.isfinite(each)):
         return []
     least = min(each)
-    nats = math.sqrt(each[0] * each[1]) if least > 0 else least
+    # One nat more for either, which is chance. A truth that loses by far did not find back to its numbers.
+    nats = math.sqrt(float(np.prod(np.maximum(each, 0.0) + 1.0))) - 1.0 if least > -SIGNIFICANT else least
     names = leading.rivals[0].name, leading.rivals[1].name
     return [Proposal(words, nats, least, _reach(leading, one[0]), names, one[0])]
 
