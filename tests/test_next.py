@@ -88,13 +88,11 @@ def test_a_test_in_which_a_rival_might_run_away_is_none(undecided):
 
 
 def test_where_no_test_tells_much_the_best_is_proposed_longer_and_tells_more(undecided, monkeypatch):
-    monkeypatch.setattr(Leading, "tests", lambda leading: [Variation(speed=0.7), Variation(level=0.9)])
-    found = undecided.next_tests()
+    monkeypatch.setattr(Leading, "tests", lambda leading: [Variation(speed=0.7), Variation(level=1.5)])
+    found = undecided.next_tests(key=jax.random.key(3))
     lengths = [len(p.record) for p in found]
-    assert 3 <= len(found) <= 4 and max(lengths) == lengths[0] == 4 ** (len(found) - 2) * min(lengths)
-    assert found[0].nats > found[1].nats and found[0].what.endswith(
-        f"until it is {lengths[0] // min(lengths)} times as long"
-    )
+    assert len(found) == 4 and max(lengths) == lengths[0] == 16 * min(lengths)
+    assert found[0].nats > found[1].nats and found[0].what.endswith(", there and back until it is 16 times as long")
     force = found[0].record.force
     assert force is not None
     np.testing.assert_array_equal(force, np.concatenate([half := force[: len(force) // 2], half]))
