@@ -42,8 +42,8 @@ STUCK = 0.05
 PILOT = 6000
 """Samples along which a law is brought to its size."""
 LONG = 200_000
-# Structures that are drawn for a seed, at most.
 STRUCTURES = 5
+"""Drawn for a seed, at most."""
 SHAKEN = ("cubic_hardening", "coulomb", "quadratic_damping", "bouc_wen", "end_stop", "none")
 LET_GO = ("cubic_hardening", "quintic_stiffness", "quadratic_damping", "coulomb", "none")
 LASTING = ("cubic_hardening", "coulomb", "bouc_wen", "none")

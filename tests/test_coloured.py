@@ -14,12 +14,12 @@ RIGHT = jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING)
 MEMORY, LEVEL = 0.9, 0.02
 
 
-def remembering(record: jfsm.Record, only: str | None = None) -> jfsm.Record:
+def remembering(record: jfsm.Record) -> jfsm.Record:
     """The record with noise that remembers ten samples on its channels, in shares of their size."""
     rng, kinds = np.random.default_rng(5), dict[str, Any]()
     for (kind, _), y in record.channels.items():
         noise = lfilter([1.0], [1.0, -MEMORY], rng.standard_normal(y.size + 200))[200:] * np.sqrt(1 - MEMORY**2)
-        kinds[kind] = y + LEVEL * y.std() * noise * (only in (None, kind))
+        kinds[kind] = y + LEVEL * y.std() * noise
     return jfsm.Record(record.time, **kinds, at_rest=True)
 
 

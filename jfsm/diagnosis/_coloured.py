@@ -9,7 +9,7 @@ from ..records import rolloff
 from ._adequacy import white
 from ._problem import Problem
 from ._standing import UNPREDICTED
-from ._trial import Trial
+from ._trial import Trial, standardised
 
 _FALLS = 3.0
 """Nats by which the upper part of a channel's spectrum has to speak for a memory of its noise."""
@@ -30,30 +30,21 @@ def coloured(beside: Trial, problem: Problem) -> Problem | None:
     memory they have to be white over half a period, and far likelier. The noise of the force is as strong as its own
     spectrum lets it be, at most.
     """
-    first = problem.first
-    if problem.imposed or first.colour is not None or white(beside):
+    if problem.imposed or problem.first.colour is not None or white(beside):
         return None
     posterior, count = problem.posterior_of(beside), len(problem.records)
-    falls = sum(np.array([rolloff(y).nats for y in _errors(posterior, beside.theta, i).T]) for i in range(count))
+    falls = sum(np.array([rolloff(y).nats for y in standardised(posterior, beside.theta, i).T]) for i in range(count))
     channels = np.flatnonzero(falls > _FALLS).tolist()
     if not channels:
         return None
     loudest = max(_loudest(n, end) for n, end in zip(problem.records, problem.until, strict=True))
     other = problem.with_colour(posterior.colour(beside.theta, channels, loudest))
     again = other.posterior_of(beside)
-    scales = np.array([u.path.startswith("noise@") for u in beside.unknowns])
-    theta = np.where(scales, 0.0, beside.theta)
+    theta = again.at_the_floor(beside.theta)
     before, after = (float(p.evaluate(t[None])[0][0]) for p, t in ((posterior, beside.theta), (again, theta)))
     if before - after < UNPREDICTED:
         return None
     return other if all(_uncorrelated(again, theta, index) for index in range(count)) else None
-
-
-def _errors(posterior: Posterior, theta: np.ndarray, index: int) -> np.ndarray:
-    """Innovations (until, channels) of what was fitted, in their standard deviations; none where no reading counts."""
-    until, found = posterior.until[index], posterior.innovations(theta, index)
-    alive = (np.asarray(posterior.records[index].readings.use)[:until] > 0) & (found.variance[:until] > 0)
-    return np.where(alive, found.error[:until] / np.sqrt(np.where(alive, found.variance[:until], 1.0)), 0.0)
 
 
 def _loudest(nuisances: Nuisances, until: int) -> float:
@@ -78,7 +69,7 @@ def _uncorrelated(posterior: Posterior, theta: np.ndarray, index: int) -> bool:
     ----------
     G. M. Ljung, G. E. P. Box, Biometrika 65 (1978) 297.
     """
-    nuisances, until, error = posterior.records[index], posterior.until[index], _errors(posterior, theta, index)
+    nuisances, until, error = posterior.records[index], posterior.until[index], standardised(posterior, theta, index)
     lags = int(np.clip(nuisances.period / nuisances.record.dt / 2, *_LAGS))
     total = np.maximum(np.sum(error**2, 0), np.finfo(float).tiny)
     power = sum((np.sum(error[k:] * error[:-k], 0) / total) ** 2 for k in range(1, lags + 1)) - lags / until

@@ -242,15 +242,15 @@ def _made(leading: Leading, test: Variation, truth: Trial, rng: np.random.Genera
 
     Nothing where the structure runs away, or would if it were driven somewhat harder.
     """
-    nuisances, structure, rests = leading.nuisances, truth.extended(), _rests(truth.extended())
+    nuisances, structure = leading.nuisances, truth.extended()
+    rests = _rests(structure)
     sure = not any(_rests(rival.structure) for rival in leading.rivals)
 
     def followed(test: Variation):
         plan = _plan(nuisances.record[: leading.samples], test, known=sure)
         state = None if plan.driven else _start(truth, nuisances, test.level)
         if plan.driven and rests:  # what is buckled rests in one of its wells
-            (_, stretched), rest = rests[0]
-            state = np.array([rest if stretched == 1 else -rest]), np.zeros(1)
+            state = np.array([at_rest(*rests[0])["x0@1", None].value]), np.zeros(1)
         return plan, simulate(structure, plan, state, reconstruction=nuisances.reconstruction, solver="grid")
 
     plan, response = followed(test)

@@ -40,11 +40,11 @@ class Problem(NamedTuple):
     def of(self, records: Sequence[Record], weighed: Structure) -> "Problem":
         """The same of other records of the same channels, seen as those that they stand for."""
         prepared = prepare_all(records, self.model, self.first.reconstruction, weighed=weighed)
-        seen = [
-            (n if known.colour is None else n.with_colour(known.colour)).with_wandering(known.readings.wandering)
-            for n, known in zip(prepared, self.records, strict=True)
-        ]
-        return self._replace(records=seen)
+        return self._replace(records=[n.knowing(known) for n, known in zip(prepared, self.records, strict=True)])
+
+    def knowing(self, other: "Problem") -> "Problem":
+        """The same, with what another problem of the same channels tells of these."""
+        return self._replace(records=[n.knowing(other.first) for n in self.records])
 
     def with_wandering(self, channel: int) -> "Problem":
         """The same, the zero of one more channel wandering."""

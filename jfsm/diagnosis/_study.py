@@ -94,11 +94,7 @@ class Study:
         else:
             part, given, refitted = _believed(_problem(parts, self.model, self.reconstruction))
             part, every, ahead = self._sought(part, given, refitted, known)
-            for channel in part.first.readings.wandering:
-                problem = problem.with_wandering(channel)
-            if part.first.colour is not None:
-                problem = problem.with_colour(part.first.colour)
-            problem, given, refitted = _believed(problem, near=ahead.refitted)
+            problem, given, refitted = _believed(problem.knowing(part), near=ahead.refitted)
             found = self._fitted_again(ahead, given, refitted, problem)
             if unless_later and _later(found.refitted, NEGLIGIBLE):
                 return found.refitted

@@ -256,6 +256,13 @@ def extent(nuisances: Nuisances) -> np.ndarray:
     return np.minimum(np.std(about[free], 0), nuisances.spread)
 
 
+def standardised(posterior: Posterior, theta: np.ndarray, index: int) -> np.ndarray:
+    """Innovations (until, channels) of what was fitted, in their standard deviations; none where no reading counts."""
+    until, found = posterior.until[index], posterior.innovations(theta, index)
+    alive = (np.asarray(posterior.records[index].readings.use)[:until] > 0) & (found.variance[:until] > 0)
+    return np.where(alive, found.error[:until] / np.sqrt(np.where(alive, found.variance[:until], 1.0)), 0.0)
+
+
 def whiteness(posterior: Posterior, theta: np.ndarray) -> float:
     """Largest lag-one correlation of the innovations of any channel over the samples that were fitted.
 
@@ -263,10 +270,7 @@ def whiteness(posterior: Posterior, theta: np.ndarray) -> float:
     """
     worst = 0.0
     for index, nuisances in enumerate(posterior.records):
-        found = posterior.innovations(theta, index)
-        counted = slice(1, posterior.until[index])
-        alive = (np.asarray(nuisances.readings.use)[counted] > 0) & (found.variance[counted] > 0)
-        r = np.where(alive, found.error[counted] / np.sqrt(np.where(alive, found.variance[counted], 1.0)), 0.0)
+        r = standardised(posterior, theta, index)[1:]
         correlation = np.abs(np.sum(r[1:] * r[:-1], 0) / np.maximum(np.sum(r * r, 0), 1e-300))
         correlation = np.where(nuisances.coarse, _OF_DIGITS * correlation, correlation)
         worst = max(worst, float(np.max(correlation)) * min(1.0, math.sqrt(len(r) / _ENOUGH)))

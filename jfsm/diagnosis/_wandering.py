@@ -5,7 +5,7 @@ import numpy as np
 from ..identification import Nuisances, Posterior
 from ._problem import Problem
 from ._standing import UNPREDICTED
-from ._trial import Trial
+from ._trial import Trial, standardised
 
 _DEGREE = 5
 """Of the polynomials of time that stand for what is slow."""
@@ -37,15 +37,9 @@ def wandering(beside: Trial, problem: Problem, least: float) -> int | None:
 
 def _slow(posterior: Posterior, beside: Trial, index: int) -> np.ndarray:
     """Share of the power of every channel's innovations (channels,) that a slow curve explains."""
-    nuisances, until = posterior.records[index], posterior.until[index]
-    found = posterior.innovations(beside.theta, index)
-    use = np.asarray(nuisances.readings.use)[:until]
-    shares = []
-    for c in range(use.shape[1]):
-        alive = (use[:, c] > 0) & np.isfinite(found.error[:until, c])
-        error = np.where(alive, found.error[:until, c] / np.sqrt(found.variance[:until, c]), 0.0)
-        shares.append(1.0 - np.sum(steady(error) ** 2) / max(np.sum(error**2), np.finfo(float).tiny))
-    return np.array(shares)
+    error = standardised(posterior, beside.theta, index)
+    error = np.where(np.isfinite(error), error, 0.0)
+    return 1.0 - np.sum(steady(error) ** 2, 0) / np.maximum(np.sum(error**2, 0), np.finfo(float).tiny)
 
 
 def steadied(nuisances: Nuisances) -> Nuisances:

@@ -204,6 +204,12 @@ class Nuisances:
             colour=colour,
         )
 
+    def knowing(self, other: "Nuisances") -> "Nuisances":
+        """The same record, with what is known of the same channels of another: which zeros wander, and what noise
+        remembers."""
+        seen = self if other.colour is None else self.with_colour(other.colour)
+        return seen.with_wandering(other.readings.wandering)
+
     def pushed(self, force: np.ndarray) -> Fine:
         """What drives the record, and another force (n, dof) as well."""
         fine = self.fine

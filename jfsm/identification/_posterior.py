@@ -150,13 +150,7 @@ class Posterior:
         """
         nuisances, (plant, maps, mine) = self.records[index], self._parts[index]
         inner = np.zeros((len(self._pick), maps.unit.shape[1]))
-        chosen = np.array(
-            [
-                0.0 if u.path.startswith("noise@") and not noise_scales else t
-                for u, t in zip(self.hypothesis.unknowns[0], theta, strict=True)
-            ]
-        )
-        inner[:, : len(mine)] = chosen[mine]
+        inner[:, : len(mine)] = (theta if noise_scales else self.at_the_floor(theta))[mine]
         readings = nuisances.readings
         if use is not None:
             padded = np.zeros(readings.use.shape)
@@ -175,13 +169,17 @@ class Posterior:
         n = nuisances.samples
         return Innovations(*(np.asarray(array)[0, :n] for array in found))  # pyright: ignore[reportArgumentType]
 
+    def at_the_floor(self, theta: np.ndarray) -> np.ndarray:
+        """The same values (unknowns,), the noise of every channel as strong as it was taken to be."""
+        scales = [u.path.startswith("noise@") for u in self.hypothesis.unknowns[0]]
+        return np.where(scales, 0.0, theta)
+
     def colour(self, theta: np.ndarray, channels: Sequence[int], loudest: float) -> Colour:
         """The most likely colour of the noise of these channels at `theta` (unknowns,) of a hypothesis with one start.
 
         It is the same in all records. The noise of the force is up to `loudest` times as strong as it was taken to be.
         """
-        scales = [u.path.startswith("noise@") for u in self.hypothesis.unknowns[0]]
-        quiet, picked, powers = np.where(scales, 0.0, theta), list(channels), []
+        quiet, picked, powers = self.at_the_floor(theta), list(channels), []
         for index, end in enumerate(self.until):
             use = np.asarray(self.records[index].readings.use)[:end, picked]
             error = np.where(use > 0, self.innovations(theta, index).error[:end, picked], 0.0)
