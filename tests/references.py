@@ -156,3 +156,23 @@ def straight(time: np.ndarray, samples: np.ndarray) -> Force:
 def held(time: np.ndarray, samples: np.ndarray) -> Force:
     """The force that keeps each sample (n, dof) until the next."""
     return lambda t: samples[np.searchsorted(time, t, side="right") - 1]
+
+
+def between_wells(
+    slope: float, curvature: float, damping: float, time: np.ndarray, size: float, omegas: np.ndarray, seed: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Force, displacement and acceleration (n,) of a unit mass on a buckled spring, -slope x + curvature x³.
+
+    It begins at rest in the right well; lines of equal `size` at these `omegas` drive it, their phases drawn.
+    """
+    phases = np.random.default_rng(seed).uniform(0.0, 2 * np.pi, omegas.size)
+
+    def force(t):
+        return size * np.cos(np.multiply.outer(t, omegas) + phases).sum(-1)
+
+    def motion(t, y):
+        return [y[1], force(t) - damping * y[1] + slope * y[0] - curvature * y[0] ** 3]
+
+    begin = [np.sqrt(slope / curvature), 0.0]
+    y = solve_ivp(motion, (0, time[-1]), begin, t_eval=time, rtol=1e-9, atol=1e-12).y
+    return force(time), y[0], np.asarray(motion(time, y)[1])

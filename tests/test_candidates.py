@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from references import between_wells
 
 import jfsm
 from jfsm.diagnosis._akin import resting
@@ -113,22 +113,14 @@ def test_a_quadratic_spring_about_a_rest_that_nothing_tells_is_a_well_of_two(cha
 def test_a_mass_that_goes_from_well_to_well_begins_in_one_of_them(channel: str, tried: bool):
     """Its owner knows the spring of a well, and no channel where that is."""
     slope, curvature = 3.0, 1.2
-    time, omegas = np.arange(2000) * 0.08, np.linspace(0.3, 4.5, 20)
-    phases = np.random.default_rng(0).uniform(0.0, 2 * np.pi, 20)
-
-    def force(t):
-        return 0.55 * np.cos(np.multiply.outer(t, omegas) + phases).sum(-1)
-
-    def motion(t, y):
-        return [y[1], force(t) - 0.1 * y[1] + slope * y[0] - curvature * y[0] ** 3]
-
-    y = solve_ivp(motion, (0, time[-1]), [np.sqrt(slope / curvature), 0.0], t_eval=time, rtol=1e-9, atol=1e-12).y
-    assert np.count_nonzero(np.diff(np.sign(y[0]))) > 8
-    shown = y[0] if channel == "displacement" else motion(time, y)[1]
-    noisy = shown + 0.01 * np.std(shown) * np.random.default_rng(1).standard_normal(time.size)
+    time = np.arange(2000) * 0.08
+    force, x, a = between_wells(slope, curvature, 0.1, time, 0.55, np.linspace(0.3, 4.5, 20), seed=0)
+    assert np.count_nonzero(np.diff(np.sign(x))) > 8
+    y = x if channel == "displacement" else a
+    shown: dict[str, Any] = {channel: y + 0.01 * np.std(y) * np.random.default_rng(1).standard_normal(time.size)}
     model = jfsm.Structure.sdof(1.0, 2.05 * slope, 0.11)
     effect = Effect(jfsm.causes()["double_well"], (0, 1))
-    found = Laws(model, prepare(jfsm.Record(time, force(time), **{channel: noisy}), model)).between_rests(effect, 0.1)
+    found = Laws(model, prepare(jfsm.Record(time, force, **shown), model)).between_rests(effect, 0.1)
     assert bool(found) == tried
     for c in found:
         k_neg, k3 = (float(q) for q in c.starts[0].terms[-1].values)

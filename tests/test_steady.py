@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from references import between_wells
 from scipy.integrate import solve_ivp
 
 import jfsm
@@ -59,19 +60,11 @@ def test_when_a_sensor_fails_is_said(response, fails: tuple[int, int], said: str
 def test_where_small_errors_grow_by_themselves_nothing_has_changed():
     """A mass that now and then goes over the hill between two wells, predicted by the right structure."""
     slope, curvature = 1.1, 0.6
-    time, omegas = np.arange(4000) * 0.14, np.linspace(0.1, 2.5, 25)
-    phases = np.random.default_rng(8).uniform(0.0, 2 * np.pi, 25)
-
-    def force(t):
-        return 0.14 * np.cos(np.multiply.outer(t, omegas) + phases).sum(-1)
-
-    def motion(t, y):
-        return [y[1], force(t) - 0.05 * y[1] + slope * y[0] - curvature * y[0] ** 3]
-
-    y = solve_ivp(motion, (0, time[-1]), [np.sqrt(slope / curvature), 0.0], t_eval=time, rtol=1e-9, atol=1e-12).y
-    a, rng = motion(time, y)[1], np.random.default_rng(9)
-    x, a = (q + 0.02 * q.std() * rng.standard_normal(time.size) for q in (y[0], a))
-    record = jfsm.Record(time, force(time), x, acceleration=a)
+    time, rng = np.arange(4000) * 0.14, np.random.default_rng(9)
+    force, x, a = between_wells(slope, curvature, 0.05, time, 0.14, np.linspace(0.1, 2.5, 25), seed=8)
+    x, a = (q + 0.02 * q.std() * rng.standard_normal(time.size) for q in (x, a))
+    record = jfsm.Record(time, force, x, acceleration=a)
     right = jfsm.Structure.sdof(1.0, 2 * slope, 0.05) + jfsm.DoubleWell(3 * slope, curvature, at=(0, 1))
-    given, _ = fit_model(Problem(right, prepare_all([record], right), [4000]))
-    assert unsteady(given, Problem(right, prepare_all([record], right), [4000])) == []
+    problem = Problem(right, prepare_all([record], right), [4000])
+    given, _ = fit_model(problem)
+    assert unsteady(given, problem) == []

@@ -3,15 +3,17 @@
 import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import minimize
 
+from ..dynamics._grid import Fine
 from ..dynamics._imposed import Imposed
-from ..dynamics._plant import Grid, Plant, hidden_width, numbers_of
-from ..estimation._filter import Innovations, ProcessNoise
+from ..dynamics._plant import Grid, Plant, Readout, hidden_width, numbers_of
+from ..estimation._filter import Innovations, ProcessNoise, Readings
 from ..structures import AbstractFriction, ChannelDelay, ForceDelay, Structure
 from ._colour import Colour
 from ._layout import plant_rows, plant_vector
@@ -109,18 +111,8 @@ class Posterior:
             width = maps.unit.shape[1]
             inner = np.zeros((len(self._pick), width))
             inner[:, : len(mine)] = theta[self._pick][:, mine]
-            fine, readings = nuisances.head(until)
-            out = derivatives(
-                plant,
-                maps,
-                jnp.asarray(inner),
-                nuisances.show,
-                fine,
-                readings,
-                slackened(nuisances, max(slack, nuisances.forgiven)),
-                _doubt(plant, nuisances),
-                jnp.asarray(until),  # as a plain number it would be part of the program
-            )
+            seen = _Seen.of(nuisances, plant, until, max(slack, nuisances.forgiven))
+            out = derivatives(plant, maps, jnp.asarray(inner), *seen)
             v, g, f, s = (np.asarray(o)[:lanes] for o in out)
             value += v
             gradient[:, mine] += g[:, : len(mine)]
@@ -200,20 +192,8 @@ class Posterior:
         nuisances, until, (plant, maps, mine) = self.records[index], self.until[index], self._parts[index]
         inner = np.zeros(maps.unit.shape[1])
         inner[: len(mine)] = theta[mine]
-        fine, readings = nuisances.head(until)
-        value, slope = slope_by_colour(
-            plant,
-            maps,
-            jnp.asarray(inner),
-            nuisances.show,
-            fine,
-            readings,
-            nuisances.noise,
-            _doubt(plant, nuisances),
-            jnp.asarray(until),
-            jnp.asarray(values),
-            tuple(channels),
-        )
+        seen = _Seen.of(nuisances, plant, until)
+        value, slope = slope_by_colour(plant, maps, jnp.asarray(inner), *seen, jnp.asarray(values), tuple(channels))
         return float(value), np.asarray(slope)
 
     def structure(self, theta: np.ndarray, lane: int = 0) -> Structure:
@@ -247,6 +227,25 @@ class Posterior:
             *plants,
         )
         return stacked, maps, mine
+
+
+class _Seen(NamedTuple):
+    """What programs see of the first samples of a record, as many as `until`."""
+
+    show: Readout
+    fine: Fine | Imposed
+    readings: Readings
+    noise: ProcessNoise
+    doubt: jax.Array
+    until: jax.Array
+
+    @classmethod
+    def of(cls, nuisances: Nuisances, plant: Plant, until: int, slack: float = 0.0) -> "_Seen":
+        """With a `slack` of unmodelled force forgiven."""
+        fine, readings = nuisances.head(until)
+        noise, doubt = slackened(nuisances, slack), _doubt(plant, nuisances)
+        # The number of samples as a plain number would be part of the program.
+        return cls(nuisances.show, fine, readings, noise, doubt, jnp.asarray(until))
 
 
 def _lane(structure, unknowns, nuisances: Nuisances, vector, width, slots):
