@@ -51,6 +51,14 @@ def test_noise_is_no_excuse_for_a_value_that_is_off(record):
     assert not adequate(drawn)
 
 
+def test_noise_is_no_excuse_for_an_offset_that_is_a_bias(record):
+    channels = {kind: y for (kind, _), y in record.channels.items()}
+    channels["acceleration"] = channels["acceleration"] + 0.1 * np.std(channels["acceleration"])
+    first, drawn = judged(jfsm.Record(record.time, **channels), STIFFNESS)
+    assert drawn is not first, "nothing was drawn"
+    assert drawn.prediction.left > 0.8 * first.prediction.left > NEGLIGIBLE
+
+
 def test_white_innovations_tell_the_noise_of_a_channel_that_gave_but_a_guess(record):
     model = jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING) + Coulomb(FRICTION, at=(0, 1))
     records = prepare_all([record], model)

@@ -204,6 +204,22 @@ def test_samples_after_the_end_that_counts_have_no_part(chain_nuisances, smooth)
     assert values[2] > values[0] + 100
 
 
+def test_torn_readings_have_no_part_in_the_sizes_that_priors_go_by():
+    record = noisy_record(MODEL)
+    kinds = ("force", "displacement", "acceleration")
+    force, x, a = (np.column_stack([record.channels[kind, j] for j in (1, 2)]) for kind in kinds)
+    x[[0, 70, 140], [0, 1, 1]] += 20 * x.std()
+    clean = prepare(record, MODEL)
+    torn = prepare(jfsm.Record(record.time, force, displacement=x, acceleration=a), MODEL)
+    assert np.sum(np.asarray(torn.readings.use)[:N] == 0) == 3
+    for name in ("spread", "length", "crest"):
+        np.testing.assert_allclose(getattr(torn, name), getattr(clean, name), rtol=0.02, err_msg=name)
+    np.testing.assert_allclose(torn.x0, clean.x0, atol=0.5 * clean.length)
+    structure = with_offsets(MODEL, [clean])
+    unknowns = [{u.path: u.unit for u in nuisance_unknowns(structure, nuisances, 0)} for nuisances in (clean, torn)]
+    assert unknowns[1] == pytest.approx(unknowns[0], rel=0.02)
+
+
 def test_the_first_readings_lead_unless_the_record_begins_quietly():
     record = noisy_record(SINGLE, n=12_000)
     channels = {name: getattr(record, name) for name in ("force", "displacement", "acceleration")}

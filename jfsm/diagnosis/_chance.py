@@ -41,7 +41,7 @@ def beside_chance(trials: Sequence[Trial], problem: Problem, key: jax.Array) -> 
     def draw(rng: np.random.Generator) -> np.ndarray:
         noisy = [_noisy(*parts, rng) for parts in zip(records, runs, levels, strict=True)]
         again = problem.of(noisy, best.structure)
-        return predict(again.posterior_of(best), best.theta, slight=not best.effects).error
+        return predict(again.posterior_of(best), best.theta).error
 
     errors = np.array(list(side_by_side(draw, np.random.default_rng(seeds).spawn(_DRAWS))))
     found = best.prediction

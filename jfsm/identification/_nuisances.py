@@ -1,7 +1,7 @@
 """What every hypothesis on a record shares: its noise, its reconstructed drive, its unknown start and offsets."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -25,7 +25,7 @@ from ..dynamics._plant import Channel, Readout, lower, readout
 from ..dynamics._simulate import check_pair
 from ..dynamics._start import starting_state
 from ..estimation._filter import ProcessNoise, Readings
-from ..records import NoiseFloor, Record, clipped, declipped, noise_floor, quantisation_step, spikes, tones
+from ..records import NoiseFloor, Record, bridged, clipped, declipped, noise_floor, quantisation_step, spikes, tones
 from ..structures import Structure
 from ._colour import Colour
 
@@ -266,8 +266,8 @@ def prepare(
         return _prepare_imposed(record, model, reconstruction)
     channels = tuple(record.responses)
     values = np.column_stack([record.responses[c] for c in channels])
-    spread = _spread(channels, values)
-    use, floor, trusted, torn = _noise(channels, values, spread, record.dt)
+    values, use, floor, trusted, lost = _noise(channels, values, record.dt)
+    spread = np.std(values, axis=0)
     force, words = _force(record, model)
     omega = fastest_mode(lower(model)) or _rate(values[:, 0], record.dt)
     length, crest = _size(channels, values, spread, omega)
@@ -276,7 +276,7 @@ def prepare(
     for i, (kind, j) in enumerate(channels):
         if kind == "acceleration":  # an acceleration is predicted with the force's own noise, less what smoothing took
             variance[i] += force.by_sample[j - 1] / mass[j - 1, j - 1] ** 2
-    x0, v0 = _start(record, model, reconstruction)
+    x0, v0 = _start(record, model, reconstruction, dict(zip(channels, values[0].tolist(), strict=True)))
     return Nuisances(
         record=record,
         channels=channels,
@@ -297,7 +297,7 @@ def prepare(
         v0=v0,
         at_rest=record.at_rest,
         reconstruction=reconstruction,
-        notes=(*record.notes, *torn, *words),
+        notes=(*record.notes, *lost, *words),
     )
 
 
@@ -387,23 +387,25 @@ def _spread(channels: tuple[Channel, ...], values: np.ndarray) -> np.ndarray:
 
 
 def _noise(
-    channels: tuple[Channel, ...], values: np.ndarray, spread: np.ndarray, dt: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
-    """Which readings (n, channels) take part, standard deviation of each channel's noise, whether it is trusted, and
-    notes."""
+    channels: tuple[Channel, ...], values: np.ndarray, dt: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[str]]:
+    """Readings (n, channels) without spikes, which of them take part, standard deviation of each channel's noise,
+    whether it is trusted, and notes."""
     use, floor, trusted = np.ones_like(values), np.zeros(len(channels)), np.zeros(len(channels), dtype=bool)
-    notes = []
+    values, spread, notes = values.copy(), _spread(channels, values), []
     for i, (kind, j) in enumerate(channels):
         cut = clipped(values[:, i])
         found = _noise_floor(values[:, i], cut, dt)
         trusted[i] = found.spacing > _FINEST
         std = found.std if trusted[i] else min(found.std, _BAND_LIMITED * spread[i])
         floor[i] = max(std, _LEAST_NOISE * spread[i])
-        lost = cut | spikes(values[:, i], floor[i])
+        torn = spikes(values[:, i], floor[i])
+        lost = cut | torn
+        values[:, i] = bridged(values[:, i], torn)
         if np.any(lost):
             use[lost, i] = 0.0
             notes.append(f"{kind} {j}: {int(lost.sum())} clipped or torn samples take no part.")
-    return use, floor, trusted, notes
+    return values, use, floor, trusted, notes
 
 
 def _noise_floor(samples: np.ndarray, cut: np.ndarray, dt: float) -> NoiseFloor:
@@ -441,12 +443,14 @@ def _disturbance(mass: np.ndarray, force_variance: np.ndarray, omega: float, len
     return ProcessNoise(jnp.asarray(forced + np.eye(len(mass)) * (_LEAST_DISTURBANCE * size) ** 2 / omega * dt))
 
 
-def _start(record: Record, model: Structure, reconstruction: Reconstruction) -> tuple[np.ndarray, np.ndarray]:
-    """First guess of the initial state: what is measured tells more than a model that lacks something."""
+def _start(
+    record: Record, model: Structure, reconstruction: Reconstruction, shown: Mapping[Channel, float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """First guess of the initial state: what is `shown` first tells more than a model that lacks something."""
     x0, v0 = starting_state(model, record, reconstruction=reconstruction)
-    for (kind, j), samples in record.responses.items():
+    for (kind, j), reading in shown.items():
         if kind != "acceleration" and not record.at_rest:
-            (x0 if kind == "displacement" else v0)[j - 1] = samples[0]
+            (x0 if kind == "displacement" else v0)[j - 1] = reading
     return x0, v0
 
 

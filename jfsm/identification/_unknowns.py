@@ -208,9 +208,9 @@ def _offset_channels(structure: Structure, nuisances: Nuisances) -> list[tuple[s
 def nuisance_unknowns(structure: Structure, nuisances: Nuisances, index: int) -> list[Unknown]:
     """Offsets, initial state and noise scales of one record; `structure` carries the offsets."""
     found = []
-    values = structure.values()
+    values, spread = structure.values(), dict(zip(nuisances.channels, nuisances.spread.tolist(), strict=True))
     for kind, j in _offset_channels(structure, nuisances):
-        size = float(np.std(nuisances.record.channels[(kind, j)]))
+        size = spread.get((kind, j)) or float(np.std(nuisances.record.channels[kind, j]))
         unit, degrees = size * _SLIGHT, math.inf
         if kind in ("displacement", "velocity"):
             unit, degrees = size * _OFFSET, DEGREES
