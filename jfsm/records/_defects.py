@@ -18,10 +18,11 @@ VISITS, DISTINCT = 4, 0.99  # returns to the same level, and share of other valu
 SPIKE_ROBUST, SPIKE_FLOORS = 8.0, 6.0  # a spike is this many robust deviations and this many noise floors off
 SURROUNDING = 101  # samples in which the robust deviation is taken
 OUTSIDE = 0.75  # share of a spike's height that must stand out of the range of the samples beside it
+STEEP = 4.0  # times as high as the motion goes between samples, from which a spike stands out of its slope
 ALONE = 3.0  # times as far off as anything that is left around it: where a channel rattles, its crests are no spikes
 OFF_CURVE = np.array([-1.0, 6.0, -15.0, 20.0, -15.0, 6.0, -1.0]) / 20.0  # a sample minus the quintic through six beside
 BESIDE = 3  # samples on either side of a spike that make its curve
-TORN = ((0,), (0, 1), (-1, 0), (0, 2), (-2, 0))  # which samples a spike takes, beside the one that is farthest off
+TORN = ((0,), (0, 1), (-1, 0), (0, 2), (-2, 0), (0, 3), (-3, 0))  # which samples a spike takes, beside the one farthest off
 PASSES = 2  # of three that are close together, the third is seen once the others are mended
 ONE_SIDED = 2.0  # times as far off where the curve ends beside a spike and goes on by itself
 
@@ -118,16 +119,25 @@ def _mended(y: NDArray[np.float64], torn: NDArray[np.int_], limit: float) -> boo
     beside = np.setdiff1d(around, torn)
     curve = _through(tuple(beside - torn[0]), tuple(torn - torn[0])) @ y[beside]
     height = np.abs(y[torn] - curve)
-    nearest = y[beside[(beside > torn[0] - BESIDE) & (beside < torn[-1] + BESIDE)]]
-    outside = np.maximum(y[torn] - nearest.max(), nearest.min() - y[torn])
     steepest = max(
         np.abs(np.diff(y[part])).max(initial=0.0) for part in (beside[beside < torn[0]], beside[beside > torn[-1]])
     )
+    nearest = beside[(beside > torn[0] - BESIDE) & (beside < torn[-1] + BESIDE)]
+    outside = _outside(y[torn], y[nearest])
+    if np.all(height > STEEP * steepest):
+        # Of a fast motion a high spike may be in the range of the samples beside it; not about the line through these.
+        slope = np.polyfit(beside, y[beside], 1)[0]
+        outside = np.maximum(outside, _outside(y[torn] - slope * torn, y[nearest] - slope * nearest))
     limit *= 1.0 if beside.size >= 2 * BESIDE else ONE_SIDED
     if np.any(height <= max(limit, steepest)) or np.any(outside < OUTSIDE * height):
         return False
     y[torn] = curve
     return True
+
+
+def _outside(y: NDArray[np.float64], range_of: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far values are outside of the range of others; negative inside."""
+    return np.maximum(y - range_of.max(), range_of.min() - y)
 
 
 @lru_cache
