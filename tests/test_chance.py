@@ -10,6 +10,7 @@ import jfsm
 from jfsm.demo import DAMPING, FRICTION, MASS, STIFFNESS, hidden_friction
 from jfsm.diagnosis._adequacy import NEGLIGIBLE, adequate
 from jfsm.diagnosis._chance import beside_chance, noise_beyond
+from jfsm.diagnosis._gain import BASE, remeasured
 from jfsm.diagnosis._problem import Problem
 from jfsm.diagnosis._search import fit_model
 from jfsm.diagnosis._trial import Trial
@@ -57,6 +58,19 @@ def test_noise_is_no_excuse_for_an_offset_that_is_a_bias(record):
     first, drawn = judged(jfsm.Record(record.time, **channels), STIFFNESS)
     assert drawn is not first, "nothing was drawn"
     assert drawn.prediction.left > 0.8 * first.prediction.left > NEGLIGIBLE
+
+
+def test_what_is_measured_anew_has_the_noise_of_the_base():
+    time = 0.01 * np.arange(2000)
+    truth = {("displacement", 1): np.sin(time), BASE: np.cos(time)}
+    record = jfsm.Record(time, displacement=np.sin(time), base_acceleration=np.sin(3 * time))
+    levels = {("displacement", 1): 0.01, BASE: 0.05}
+    again = remeasured(record, truth, levels, np.random.default_rng(0))
+    assert again.base_acceleration is not None
+    assert np.std(again.base_acceleration - np.cos(time)) == pytest.approx(0.05, rel=0.1)
+    assert np.std(again.displacement[:, 0] - np.sin(time)) == pytest.approx(0.01, rel=0.1)
+    as_it_was = remeasured(record, {("displacement", 1): np.sin(time)}, {}, np.random.default_rng(0))
+    np.testing.assert_array_equal(as_it_was.base_acceleration, record.base_acceleration)
 
 
 def test_white_innovations_tell_the_noise_of_a_channel_that_gave_but_a_guess(record):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import jfsm
+from jfsm.dynamics._grid import Fine
 from jfsm.identification import (
     Hypothesis,
     Nuisances,
@@ -218,6 +219,36 @@ def test_torn_readings_have_no_part_in_the_sizes_that_priors_go_by():
     structure = with_offsets(MODEL, [clean])
     unknowns = [{u.path: u.unit for u in nuisance_unknowns(structure, nuisances, 0)} for nuisances in (clean, torn)]
     assert unknowns[1] == pytest.approx(unknowns[0], rel=0.02)
+
+
+def test_noise_in_the_motion_of_the_base_drives_all_masses():
+    rng, time = np.random.default_rng(4), 0.2 * DT * np.arange(3000)
+    shaken = sum(
+        np.sin(omega * time + omega) for omega in (0.9, 1.7, 2.3, 3.1, 4.4, 5.2, 6.1, 7.3, 8.2, 9.1, 10.7, 11.9)
+    )
+    run = jfsm.simulate(MODEL, jfsm.Record(time, base_acceleration=shaken, at_rest=True), solver="grid")
+    noise, x = 0.05 * np.std(shaken), run.displacement
+    record = jfsm.Record(
+        time,
+        displacement=x + 0.001 * np.std(x, 0) * rng.standard_normal(x.shape),
+        base_acceleration=shaken + noise * rng.standard_normal(time.size),
+        at_rest=True,
+    )
+    nuisances = prepare(record, MODEL)
+    assert nuisances.base_floor == pytest.approx(noise, rel=0.1)
+    assert isinstance(nuisances.fine, Fine)
+    left = float(np.std(np.asarray(nuisances.fine.base)[: time.size, 0] - shaken))
+    assert left < 0.5 * noise, "the noise is smoothed away as far as the band of the motion lets it be"
+    inertia = np.array([1.3, 0.8])
+    density = nuisances.force_covariance / np.outer(inertia, inertia)
+    np.testing.assert_allclose(density, density[0, 0])
+    assert 0 < density[0, 0] < 1.3 * noise**2
+    one = hypothesis(MODEL, None, nuisances)
+    posterior = Posterior(one, (nuisances,), (time.size,))
+    found = posterior.innovations(posterior.initial()[0], 0)
+    r = (found.error / np.sqrt(found.variance))[100 : time.size]
+    np.testing.assert_allclose(np.std(r, 0), 1.0, atol=0.15)
+    assert np.all(np.abs(np.sum(r[1:] * r[:-1], 0) / np.sum(r * r, 0)) < 0.1)
 
 
 def test_the_first_readings_lead_unless_the_record_begins_quietly():

@@ -17,7 +17,7 @@ from ..identification import Nuisances
 from ..records import Record
 from ..structures import Clipping
 from ._adequacy import adequate, white
-from ._gain import remeasured
+from ._gain import BASE, remeasured
 from ._problem import Problem
 from ._trial import Prediction, Trial, ended, extent, free_run, predict, runs_away, sets
 
@@ -70,19 +70,21 @@ def noise_beyond(trials: Sequence[Trial], problem: Problem) -> np.ndarray:
 
 
 def noise_levels(trial: Trial, nuisances: Nuisances, index: int = 0) -> dict[tuple, float]:
-    """Standard deviation of every channel's noise in record `index`: of responses as fitted, of forces at its floor."""
+    """Standard deviation of every channel's noise in record `index`: of responses as fitted, of what drives at its
+    floor."""
     scales = {u.path: theta for u, theta in ended(trial) if u.record in (None, index)}
     levels = {
         channel: float(floor) * math.exp(scales.get(f"noise@{c}", 0.0) / 2)
         for c, (channel, floor) in enumerate(zip(nuisances.channels, nuisances.floor, strict=True))
     }
-    return levels | {("force", j + 1): float(floor) for j, floor in enumerate(nuisances.force_floor)}
+    forces = {("force", j + 1): float(floor) for j, floor in enumerate(nuisances.force_floor)}
+    return levels | forces | {BASE: nuisances.base_floor}
 
 
 def _noisy(nuisances: Nuisances, run: np.ndarray, levels: dict[tuple, float], rng: np.random.Generator) -> Record:
-    """The record of a run under the force as it is taken to be, with fresh noise on every channel."""
+    """The record of a run under what is taken to drive it, with fresh noise on every channel."""
     assert isinstance(nuisances.fine, Fine)
-    force = np.asarray(nuisances.fine.force)[: nuisances.samples, 0]
-    truth = dict(zip(nuisances.channels, run.T, strict=True))
+    force, base = (np.asarray(drive)[: nuisances.samples, 0] for drive in (nuisances.fine.force, nuisances.fine.base))
+    truth = {**dict(zip(nuisances.channels, run.T, strict=True)), BASE: base}
     truth |= {channel: force[:, channel[1] - 1] for channel in nuisances.record.channels if channel[0] == "force"}
     return remeasured(nuisances.record, truth, levels, rng, nuisances.memories)

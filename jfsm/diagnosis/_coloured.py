@@ -56,7 +56,7 @@ def _loudest(nuisances: Nuisances, until: int) -> float:
     for (kind, j), samples in nuisances.record.channels.items():
         if kind != "force" or not nuisances.force_floor.size or nuisances.force_floor[j - 1] == 0:
             continue
-        found, known = rolloff(samples[:until]), float(nuisances.force_variance[j - 1])
+        found, known = rolloff(samples[:until]), float(nuisances.force_covariance[j - 1, j - 1])
         if found.nats > _FALLS and known > _MOSTLY * float(nuisances.force_floor[j - 1]) ** 2:
             most = max(most, found.density(nuisances.omega * nuisances.record.dt) / known)
     return most

@@ -33,6 +33,8 @@ _DRAWS = 4
 _BLOCK, _FEWEST, _MOST_BLOCKS = 2.0, 5, 20
 """Periods in a block of held-out readings where there are enough, and how many are drawn anew for an interval."""
 _RESAMPLED = 1000
+BASE = ("base_acceleration", 0)
+"""What stands for the acceleration of the base among channels."""
 
 
 StructureOf = Callable[[int | None], Structure]
@@ -277,18 +279,20 @@ def remeasured(
 ) -> Record:
     """The record, had its channels measured this, with fresh noise of these standard deviations.
 
-    Of some of it a share has a memory, as in `Nuisances.memories`.
+    Of some of it a share has a memory, as in `Nuisances.memories`. What drives the base is as it was where `truth` does
+    not have it.
     """
     kinds: dict[str, Any] = {}
-    for (kind, j), y in truth.items():
+    base = {} if record.base_acceleration is None else {BASE: truth.get(BASE, record.base_acceleration)}
+    for (kind, j), y in {**{c: y for c, y in truth.items() if c != BASE}, **base}.items():
         noise = rng.standard_normal(y.size)
         if memories and (kind, j) in memories:
             memory, share = memories[kind, j]
             noise = math.sqrt(1 - share) * noise + math.sqrt(share) * _remembering(y.size, memory, rng)
         kinds.setdefault(kind, {})[j] = y + levels.get((kind, j), 0.0) * noise
-    return Record(
-        record.time, **kinds, base_acceleration=record.base_acceleration, at_rest=record.at_rest, drive=record.drive
-    )  # pyright: ignore
+    if base:
+        kinds[BASE[0]] = kinds[BASE[0]][BASE[1]]
+    return Record(record.time, **kinds, at_rest=record.at_rest, drive=record.drive)  # pyright: ignore
 
 
 def _remembering(n: int, memory: float, rng: np.random.Generator) -> np.ndarray:

@@ -189,7 +189,7 @@ class Study:
         if effects:
             found = self._slightly_late(best, effects, problem)
             found = found or search_pairs(effects, trials, known, refitted, problem, self.tell)
-            # By itself an effect of a pair may be likelier than any before: what is akin to it was not tried from there.
+            # By itself an effect of a pair may be likelier than any before: what is akin to it begins from there too.
             single = Found([t for t in found.trials if len(t.effects) == 1], [])
             if ahead := [t for t in single.trials if t.evidence > best.evidence]:
                 found = found.and_then(search_akin(ahead, every, single, problem, self.tell))

@@ -175,13 +175,15 @@ def excitation(
     *,
     length: int | None = None,
     force: np.ndarray | None = None,
+    base: np.ndarray | None = None,
 ) -> Fine:
     """Drive of a record on half steps, padded to `length` samples with its last value, which a late sensor asks for.
 
-    `force` (n, dof) replaces the record's own samples where they were smoothed or restored beforehand.
+    `force` (n, dof) and `base` (n,) replace the record's own samples where they were smoothed or restored beforehand.
     """
     samples = measured_force(record, dof) if force is None else force
-    base = np.zeros(len(record)) if record.base_acceleration is None else record.base_acceleration
+    if base is None:
+        base = np.zeros(len(record)) if record.base_acceleration is None else record.base_acceleration
     n, factor = len(record), 2 * substeps
     padded = n if length is None else length
     both = np.column_stack([samples, base])

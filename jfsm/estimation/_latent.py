@@ -65,7 +65,7 @@ class _Model(NamedTuple):
 
 
 def latent_force(
-    plant: Plant, show: Readout, fine: Fine, values, use, variance, force_variance, omega: float, length: float
+    plant: Plant, show: Readout, fine: Fine, values, use, variance, force_covariance, omega: float, length: float
 ) -> Latent:
     """Smoothed motion and missing force.
 
@@ -77,7 +77,7 @@ def latent_force(
         What drives the record, at least as long as the readings.
     values, use : (n, channels) arrays
         Readings, and which of them count.
-    variance, force_variance : (channels,), (dof,) arrays
+    variance, force_covariance : (channels,), (dof, dof) arrays
     omega, length : float
         Angular frequency [rad/s] and size of the motion.
     """
@@ -101,7 +101,7 @@ def latent_force(
             fine.substeps,
             tau / omega,
             share * omega**2 * length,
-            np.asarray(force_variance),
+            np.asarray(force_covariance),
             np.asarray(variance),
             omega,
             length,
@@ -149,7 +149,7 @@ def _on_time(plant: Plant, seen: np.ndarray, use: np.ndarray, dt: float) -> tupl
 
 
 def _model(
-    plant: Plant, show: Readout, dt, substeps, tau, amplitude, force_variance, variance, omega, length
+    plant: Plant, show: Readout, dt, substeps, tau, amplitude, force_covariance, variance, omega, length
 ) -> _Model:
     dof = plant.dof
     minv = np.linalg.inv(np.asarray(plant.mass))
@@ -167,7 +167,7 @@ def _model(
     step = scipy.linalg.expm(rate * dt)
     mass = np.diag(np.asarray(plant.mass))
     noise = np.zeros((n, n))
-    noise[dof : 2 * dof, dof : 2 * dof] = minv @ np.diag(force_variance * dt**2) @ minv.T
+    noise[dof : 2 * dof, dof : 2 * dof] = minv @ (force_covariance * dt**2) @ minv.T
     wander = np.zeros((n, n))
     wander[2 * dof :, 2 * dof :] = np.diag((amplitude * mass) ** 2 * -np.expm1(-2 * dt / tau))
     row = {

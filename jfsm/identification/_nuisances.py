@@ -67,8 +67,10 @@ class Nuisances:
         Standard deviation of each channel's readings.
     force_floor : (dof,) array
         Standard deviation of the white noise of the force's samples.
-    force_variance : (dof,) array
-        White noise as strong as what smoothing leaves of that where the structure moves.
+    base_floor : float
+        That of the acceleration of the base.
+    force_covariance : (dof, dof) array
+        White noise on the masses as strong as what smoothing leaves of both where the structure moves.
     floor : (channels,) array
         Standard deviation of each channel's white noise; a mere guess where `trusted` is false, because the channel's
         signal fills its band.
@@ -94,7 +96,8 @@ class Nuisances:
     readings: Readings
     noise: ProcessNoise
     force_floor: np.ndarray
-    force_variance: np.ndarray
+    base_floor: float
+    force_covariance: np.ndarray
     spread: np.ndarray
     floor: np.ndarray
     trusted: np.ndarray
@@ -200,7 +203,8 @@ class Nuisances:
             trusted=trusted,
             noise=colour.of_force(self.noise),
             force_floor=self.force_floor * math.sqrt(louder),
-            force_variance=self.force_variance * louder,
+            base_floor=self.base_floor * math.sqrt(louder),
+            force_covariance=self.force_covariance * louder,
             colour=colour,
         )
 
@@ -231,10 +235,11 @@ class Nuisances:
         if self.path is not None:
             return replace(self, fine=self.path.imposed(need, fine.time.shape[0]))
         assert isinstance(fine, Fine)
-        samples = np.asarray(fine.force)[: self.samples, 0]
-        length = fine.time.shape[0]
-        finer = excitation(record, samples.shape[1], need, self.reconstruction, length=length, force=samples)
-        return replace(self, fine=finer)
+        force, base = (np.asarray(drive)[: self.samples, 0] for drive in (fine.force, fine.base))
+        length, dof = fine.time.shape[0], force.shape[1]
+        return replace(
+            self, fine=excitation(record, dof, need, self.reconstruction, length=length, force=force, base=base)
+        )
 
 
 def prepare(
@@ -269,9 +274,14 @@ def prepare(
     values, use, floor, trusted, lost = _noise(channels, values, record.dt)
     spread = np.std(values, axis=0)
     force, words = _force(record, model)
+    base = None if record.base_acceleration is None else _told(record.base_acceleration, record.dt)
     omega = fastest_mode(lower(model)) or _rate(values[:, 0], record.dt)
     length, crest = _size(channels, values, spread, omega)
     mass = _mass(weighed or model)
+    covariance = np.diag(force.in_motion)
+    if base is not None:  # it moves all masses alike, through their inertia
+        inertia = mass.sum(1)
+        covariance = covariance + base.in_motion * np.outer(inertia, inertia)
     variance = floor**2
     for i, (kind, j) in enumerate(channels):
         if kind == "acceleration":  # an acceleration is predicted with the force's own noise, less what smoothing took
@@ -281,11 +291,12 @@ def prepare(
         record=record,
         channels=channels,
         show=readout(channels, model.dof),
-        fine=_drive(record, model, reconstruction, force.samples),
+        fine=_drive(record, model, reconstruction, force.samples, None if base is None else base.samples),
         readings=_padded(values, use, variance),
-        noise=_disturbance(mass, force.in_motion, omega, length, record.dt),
+        noise=_disturbance(mass, covariance, omega, length, record.dt),
         force_floor=force.floor,
-        force_variance=force.in_motion,
+        base_floor=0.0 if base is None else base.floor,
+        force_covariance=covariance,
         spread=spread,
         floor=floor,
         trusted=trusted,
@@ -355,7 +366,8 @@ def _prepare_imposed(record: Record, model: Structure, reconstruction: Reconstru
         readings=_padded(values, use, floor**2),
         noise=ProcessNoise(jnp.zeros((model.dof, model.dof))),
         force_floor=none[:0],
-        force_variance=none[:0],
+        base_floor=0.0,
+        force_covariance=np.zeros((model.dof, model.dof)),
         spread=spread,
         floor=floor,
         trusted=trusted.astype(bool),
@@ -436,10 +448,12 @@ def _padded(values: np.ndarray, use: np.ndarray, variance: np.ndarray) -> Readin
     )
 
 
-def _disturbance(mass: np.ndarray, force_variance: np.ndarray, omega: float, length: float, dt: float) -> ProcessNoise:
-    """What the noise of the force and what is never explained do to the velocity in a sample."""
+def _disturbance(
+    mass: np.ndarray, force_covariance: np.ndarray, omega: float, length: float, dt: float
+) -> ProcessNoise:
+    """What the noise of what drives and what is never explained do to the velocity in a sample."""
     inverse, size = np.linalg.inv(mass), omega**2 * length
-    forced = inverse @ np.diag(force_variance * dt**2) @ inverse.T
+    forced = inverse @ (force_covariance * dt**2) @ inverse.T
     return ProcessNoise(jnp.asarray(forced + np.eye(len(mass)) * (_LEAST_DISTURBANCE * size) ** 2 / omega * dt))
 
 
@@ -454,10 +468,12 @@ def _start(
     return x0, v0
 
 
-def _drive(record: Record, model: Structure, reconstruction: Reconstruction, force: np.ndarray) -> Fine:
-    """Drive by these samples of the force, in steps short enough for the model, as long as the padded readings."""
+def _drive(
+    record: Record, model: Structure, reconstruction: Reconstruction, force: np.ndarray, base: np.ndarray | None
+) -> Fine:
+    """Drive by these samples of force and base, in steps short enough for the model, as long as the padded readings."""
     substeps = substeps_for(model, record.dt, typical_size(record))
-    return excitation(record, model.dof, substeps, reconstruction, length=bucket(len(record)), force=force)
+    return excitation(record, model.dof, substeps, reconstruction, length=bucket(len(record)), force=force, base=base)
 
 
 def _rate(y: np.ndarray, dt: float) -> float:
@@ -475,11 +491,7 @@ def _period(model: Structure, omega: float) -> float:
 
 
 class _Force(NamedTuple):
-    """Force samples (n, dof) to run with, and their noise, each (dof,).
-
-    `floor` is the standard deviation with which they were measured; `by_sample` the variance that smoothing leaves in a
-    sample, and `in_motion` that of white noise as strong as what it leaves where the structure moves.
-    """
+    """Force samples (n, dof) to run with, and their noise as in `_Told`, each (dof,)."""
 
     samples: np.ndarray
     floor: np.ndarray
@@ -487,13 +499,21 @@ class _Force(NamedTuple):
     in_motion: np.ndarray
 
 
-def _force(record: Record, model: Structure) -> tuple[_Force, list[str]]:
-    """Force samples to run with, and notes.
+class _Told(NamedTuple):
+    """Samples (n,) of a channel that drives, to run with, and their noise.
 
-    Where the force is smooth on its own grid, its noise is smoothed away. A spline leaves all of it in the band of the
-    force, a sum of tones next to nothing. Where the force fills its band, the spline's residual is signal, and the
-    noise is taken as a thousandth of the force.
+    `floor` is the standard deviation with which they were measured; `by_sample` the variance that smoothing leaves in a
+    sample, and `in_motion` that of white noise as strong as what it leaves where the structure moves.
     """
+
+    samples: np.ndarray
+    floor: float
+    by_sample: float
+    in_motion: float
+
+
+def _force(record: Record, model: Structure) -> tuple[_Force, list[str]]:
+    """Force samples (n, dof) to run with, and notes."""
     restored, dof, notes = force_limits(model), model.dof, []
     force = measured_force(record, dof, restored)
     std, by_sample, in_motion = np.zeros((3, dof))
@@ -508,17 +528,26 @@ def _force(record: Record, model: Structure) -> tuple[_Force, list[str]]:
             notes.append(
                 f"force {j} looks clipped; its true peaks are not known, which shows as an unexplained effect."
             )
-        floor = noise_floor(force[:, j - 1], record.dt)
-        if floor.spacing < _OVERSAMPLED:
-            std[j - 1] = _BAND_LIMITED * float(np.std(samples))
-            by_sample[j - 1] = in_motion[j - 1] = std[j - 1] ** 2
-            continue
-        few = tones(force[:, j - 1], floor)
-        force[:, j - 1] = floor.smooth if few is None else few.curve
-        parameters = floor.effective_parameters if few is None else few.parameters
-        std[j - 1], by_sample[j - 1] = floor.std, floor.std**2 * parameters / samples.size
-        in_motion[j - 1] = floor.std**2 if few is None else by_sample[j - 1]
+        force[:, j - 1], std[j - 1], by_sample[j - 1], in_motion[j - 1] = _told(force[:, j - 1], record.dt)
     return _Force(force, std, by_sample, in_motion), notes
+
+
+def _told(samples: np.ndarray, dt: float) -> _Told:
+    """What drives, as a channel tells it.
+
+    Where it is smooth on its own grid, its noise is smoothed away. A spline leaves all of it in the band of the motion,
+    a sum of tones next to nothing. Where the channel fills its band, the spline's residual is signal, and the noise is
+    taken as a thousandth of the channel.
+    """
+    floor = noise_floor(samples, dt)
+    if floor.spacing < _OVERSAMPLED:
+        std = _BAND_LIMITED * float(np.std(samples))
+        return _Told(samples, std, std**2, std**2)
+    few = tones(samples, floor)
+    parameters = floor.effective_parameters if few is None else few.parameters
+    by_sample = floor.std**2 * parameters / samples.size
+    curve, in_motion = (floor.smooth, floor.std**2) if few is None else (few.curve, by_sample)
+    return _Told(curve, floor.std, by_sample, in_motion)
 
 
 def _size(channels: tuple[Channel, ...], values: np.ndarray, spread: np.ndarray, omega: float) -> tuple[float, float]:

@@ -87,7 +87,7 @@ def missing_force(structure: Structure, nuisances: Nuisances, most: int = _SAMPL
         values,
         use,
         np.asarray(nuisances.readings.variance),
-        nuisances.force_variance,
+        nuisances.force_covariance,
         nuisances.omega,
         nuisances.length,
     )
