@@ -22,7 +22,7 @@ Side = tuple[float, ...]
 
 TOLERANCE = 1e-9
 LOOKS = 4
-"""Looks per sample at the speed of a mass that slides, and at the load on one that is held."""
+"""Looks per sample at the speed of a mass that slides, at the load on one that is held, and at the way to a stop."""
 MEMORY = ("bouc_wen",)
 
 
@@ -148,14 +148,14 @@ class _Run:
             out.append(np.array([self.law.rate(w, z, side)]))
         return np.concatenate(out)
 
-    def ends(self, side: Side):
-        """Events that end this side."""
+    def ends(self, side: Side, begun: float):
+        """Events that end this side, on which the motion is since it began, whatever rounding says of that instant."""
 
         def event(index: int):
             def guard(t, y):
                 if self.held(side):
                     return self.law.parameters["F"] - abs(self.holding(t, y))
-                return self.law.kinks(*self.parts(y))[index]
+                return self.law.kinks(*self.parts(y))[index] if t > begun else side[index]
 
             guard.terminal, guard.direction = True, -1.0 if self.held(side) else -side[index]
             return guard
@@ -203,9 +203,10 @@ def move(
     while done < time.size:
         found = solve_ivp(
             partial(run.rates, side=side), (t, float(time[-1])), y, "DOP853", time[done:],
-            events=run.ends(side) or None, rtol=TOLERANCE, atol=errors,
-            # what is held has no error, and its steps would pass over what lets it go
-            max_step=(time[1] - time[0]) / LOOKS if run.held(side) else np.inf,
+            events=run.ends(side, t) or None, rtol=TOLERANCE, atol=errors,
+            # what is held has no error, and its steps would pass over what lets it go; those of a mass that is free,
+            # over a stop that it touches
+            max_step=(time[1] - time[0]) / LOOKS if run.held(side) or law.cause == "end_stop" else np.inf,
         )  # fmt: skip
         if found.status < 0:
             raise ArithmeticError(f"the motion cannot be continued: {found.message}")

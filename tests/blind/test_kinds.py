@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from benchmarks.chains import Chain, Law, move, slide
 from benchmarks.kinds import KINDS, LASTING, LET_GO, SHAKEN, drawn, one_of, right, table
@@ -43,6 +44,23 @@ def test_dry_friction_in_closed_form_is_that_of_the_integration():
     assert 0.01 < np.mean(exact.v == 0) < 0.9  # it is held now and then
     for ours, theirs in zip(exact, found, strict=True):  # its tolerance is 1e-9 a step
         np.testing.assert_allclose(ours, theirs, atol=1e-6 * float(np.std(theirs)))
+
+
+def test_a_stop_that_is_touched_for_less_than_a_step_is_left_again():
+    one, law = Chain(np.array([1.3]), np.array([150.0]), np.array([0.6])), Law("end_stop", 0, {"k": 120.0, "gap": 0.3})
+    time = np.linspace(0.0, 100.0, 5001)
+    shake = draw_noise(np.random.default_rng(3), one.modes[0], time[-1])
+    shake = shake.scaled(0.35 * one.modes[0] ** 2 * 0.3 / float(np.std(shake(time))))
+    still = np.zeros(1)
+    found = move(one, law, time, (still, still), base=shake, size=0.3)
+    assert 100 < np.sum(np.diff(np.sign(np.abs(found.x[:, 0]) - 0.3)) != 0)
+
+    def rates(t, y):
+        stop = 120.0 * (max(y[0] - 0.3, 0.0) + min(y[0] + 0.3, 0.0))
+        return [y[1], -shake(t) - (150.0 * y[0] + 0.6 * y[1] + stop) / 1.3]
+
+    plain = solve_ivp(rates, (0.0, 100.0), [0.0, 0.0], "LSODA", time, rtol=1e-9, atol=1e-10, max_step=0.005)
+    np.testing.assert_allclose(found.x[:, 0], plain.y[0], atol=0.02)
 
 
 @pytest.mark.parametrize("causes", [SHAKEN, LET_GO, LASTING])
