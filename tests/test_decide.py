@@ -512,6 +512,16 @@ def test_what_held_out_runs_speak_against_does_not_stand(verdict: str, lasting: 
 
 
 @pytest.mark.parametrize(
+    ("left", "after", "high", "stands"),
+    [(0.01, 1.3, -0.1, False), (0.01, 1.3, 0.1, True), (0.0, 1.3, -0.1, True), (0.0, 1.6, -0.1, False)],
+)
+def test_a_cause_that_leaves_something_does_not_stand_where_it_runs_worse(left, after, high, stands):
+    winner = trial(9000.0, left, "attached_oscillator")
+    gain = Gain(before=1.0, refitted=1.0, after=after, floor=0.01, channels={}, interval=(-0.5, high))
+    assert bool(_speaks_against(gain, Decision("cause", winner, {id(winner): 0.9}, {}, {}), 20.0)) != stands
+
+
+@pytest.mark.parametrize(
     ("verdict", "left", "high", "half"),
     [
         ("cause", 0.01, 0.4, True),

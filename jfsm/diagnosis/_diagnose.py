@@ -35,7 +35,7 @@ from ._wandering import steadied
 
 _WORSE = 1.5
 """Error on held-out readings, in errors of the model as given and in those that noise leaves, from which a cause makes
-the model worse."""
+the model worse, though it leaves noise only over some periods."""
 _SURELY = 2 * UNPREDICTED
 """Nats by which a law that leaves noise only is ahead of its absence, so that no prediction has to show it."""
 _ROUNDS = 3
@@ -264,9 +264,11 @@ def _closes_too_little(gain: Gain, decision: Decision) -> bool:
 
 def _speaks_against(gain: Gain, decision: Decision, ahead: float, *, lasting: bool = False) -> str:
     """Why runs on held-out readings speak against what was found, so many nats `ahead` of no effect; or nothing."""
-    if decision.verdict in ("cause", "unnamed") and gain.after > _WORSE * max(gain.before, gain.floor):
+    leaves_something = decision.verdict == "cause" and not adequate(decision.winner)
+    worse = gain.after > _WORSE * max(gain.before, gain.floor)
+    if decision.verdict in ("cause", "unnamed") and (worse or (leaves_something and gain.harmful)):
         return "runs worse on held-out readings than the model as given"
-    unsure = decision.verdict == "cause" and decision.share(decision.winner) < 0.5 and not adequate(decision.winner)
+    unsure = leaves_something and decision.share(decision.winner) < 0.5
     if unsure and not (gain.closable and gain.significant):
         return "is not likely, leaves something, and is not confirmed by held-out readings"
     unpredicted = decision.verdict == "cause" and decision.winner.laws and decision.kappa[id(decision.winner)] == 0.0
