@@ -5,6 +5,8 @@ import time
 import numpy as np
 import pytest
 
+import jfsm
+from jfsm.diagnosis._clipped import limited
 from jfsm.records import clipped, noise_floor, spikes
 
 DT = 0.02
@@ -130,6 +132,18 @@ def test_clipped_samples_are_those_at_the_limit():
 def test_one_sided_limits_are_found():
     y = np.sin(np.arange(2000) * 0.05)
     np.testing.assert_array_equal(clipped(np.minimum(y, 0.8)), y >= 0.8)
+
+
+def test_torn_samples_beyond_the_limit_do_not_hide_that_a_channel_is_clipped():
+    y, std, torn = torn_at([200, 701, 1500, 2400], lambda rng: np.array([6.0, -6.0, 6.0, -6.0]))
+    level = 0.6 * np.max(np.abs(y[~torn]))
+    y[~torn] = np.clip(y[~torn], -level, level)
+    cut = np.abs(y) == level
+    assert cut.sum() > 50 and not clipped(y).any()
+    np.testing.assert_array_equal(clipped(y, spikes(y, std)), cut)
+    record = jfsm.Record(DT * np.arange(y.size), force=np.zeros(y.size), displacement=y)
+    (sensor,) = limited([record], jfsm.Structure.sdof(1.0, 1.0, 0.1))
+    assert sensor.at == ("displacement", 1) and sensor.value == level
 
 
 def test_a_quantised_channel_is_not_clipped_for_meeting_its_end_levels():

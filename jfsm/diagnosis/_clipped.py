@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..records import Record, clipped
+from ..records import Record, clipped, noise_floor, spikes
 from ..structures import Clipping, Structure, causes
 from ._class import class_of
 from ._decide import Decision
@@ -29,8 +29,9 @@ def limited(records: Sequence[Record], model: Structure) -> list[Clipping]:
     found: dict[tuple[str, int], float] = {}
     for record in (r for r in records if r.drive == "force"):
         for channel, samples in record.channels.items():
-            cut = clipped(samples)
-            size = float(np.max(np.abs(samples)))
+            torn = spikes(samples, noise_floor(samples, record.dt).std)
+            cut = clipped(samples, torn)
+            size = float(np.max(np.abs(samples[~torn])))
             there = np.abs(samples[cut])
             if channel not in known and cut.mean() > _NOTICEABLE and np.all(there >= size * (1 - _SAME)):
                 found[channel] = max(size, found.get(channel, 0.0))

@@ -95,7 +95,7 @@ class Part:
         least = _LEAST_NOISE * spread
         noise = np.array([max(floor.std, low) for floor, low in zip(floors, least, strict=True)])
         spiky = np.column_stack([spikes(y, s) for y, s in zip(seen.T, noise, strict=True)])
-        use = np.column_stack([~clipped(y) for y in seen.T]) & ~spiky
+        use = np.column_stack([~clipped(y, torn) for y, torn in zip(seen.T, spiky.T, strict=True)]) & ~spiky
         absolute = orders == 2  # an accelerometer shows the base's motion as well
         acts = np.std(force, 0) > 0
         size = np.std(force, 0)[acts]

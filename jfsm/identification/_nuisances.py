@@ -406,8 +406,9 @@ def _noise(
     use, floor, trusted = np.ones_like(values), np.zeros(len(channels)), np.zeros(len(channels), dtype=bool)
     values, spread, notes = values.copy(), _spread(channels, values), []
     for i, (kind, j) in enumerate(channels):
-        cut = clipped(values[:, i])
-        found = _noise_floor(values[:, i], cut, dt)
+        torn = spikes(values[:, i], noise_floor(values[:, i], dt).std)
+        cut = clipped(values[:, i], torn)
+        found = _noise_floor(bridged(values[:, i], torn), cut, dt)
         trusted[i] = found.spacing > _FINEST
         std = found.std if trusted[i] else min(found.std, _BAND_LIMITED * spread[i])
         floor[i] = max(std, _LEAST_NOISE * spread[i])
@@ -430,7 +431,7 @@ def _noise_floor(samples: np.ndarray, cut: np.ndarray, dt: float) -> NoiseFloor:
     begin, end = edges[longest], edges[longest + 1] - 1
     if end - begin >= _STRETCH * len(samples):
         return noise_floor(samples[begin:end], dt)
-    limit = float(np.max(np.abs(samples)))
+    limit = float(np.max(np.abs(samples[cut])))
     alike = np.mean(cut) < _MOSTLY and np.all(np.abs(samples[cut]) >= limit * (1 - _SAME))
     found = noise_floor(declipped(samples, limit) if alike else samples, dt)
     return replace(found, std=found.std / math.sqrt(1.0 - np.mean(cut)))  # arcs that are put back hold none

@@ -12,6 +12,7 @@ Samples = NDArray[np.float64]
 
 def advanced(y: Samples, samples: float, dt: float) -> Samples:
     """A channel (n,) so many of its samples later, band-limited between them; clipped and torn ones stay."""
-    left = clipped(y) | spikes(y, noise_floor(y, dt).std)
+    torn = spikes(y, noise_floor(y, dt).std)
+    left = clipped(y, torn) | torn
     index = np.arange(y.size, dtype=np.float64)
     return np.where(left, y, filtered(bridged(y, left)[:, None], index + samples, 1.0)[:, 0])

@@ -35,12 +35,14 @@ PASSES = 2  # of three that are close together, the third is seen once the other
 ONE_SIDED = 2.0  # times as far off where the curve ends beside a spike and goes on by itself
 
 
-def clipped(y: ArrayLike) -> NDArray[np.bool_]:
+def clipped(y: ArrayLike, torn: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
     """Which samples of a channel sit at the limit of the recorder.
 
     Parameters
     ----------
     y : (n,) array
+    torn : (n,) bool array, optional
+        Samples that are no readings, and may be beyond the limit.
 
     Returns
     -------
@@ -55,6 +57,10 @@ def clipped(y: ArrayLike) -> NDArray[np.bool_]:
     that spends nine tenths of its time at both ends is a switch.
     """
     y = np.asarray(y, dtype=np.float64)
+    if torn is not None and np.any(torn):
+        mask = np.zeros(y.size, dtype=bool)
+        mask[~torn] = clipped(y[~torn])
+        return mask
     low, high = float(y.min()), float(y.max())
     if low == high:
         return np.zeros(y.size, dtype=bool)

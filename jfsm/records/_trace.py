@@ -33,7 +33,7 @@ class Trace:
     def of(cls, channel: str, unit: str, samples: Samples, floor: NoiseFloor | None) -> "Trace":
         """A channel with its defects; without a noise floor nothing is called a spike."""
         torn = np.zeros(samples.size, dtype=bool) if floor is None else spikes(samples, floor.std)
-        return cls(channel, unit, samples, clipped(samples), torn)
+        return cls(channel, unit, samples, clipped(samples, torn), torn)
 
     @property
     def lost(self) -> NDArray[np.bool_]:
