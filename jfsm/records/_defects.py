@@ -133,14 +133,13 @@ def _mended(y: NDArray[np.float64], torn: NDArray[np.int_], limit: float) -> boo
     beside = np.setdiff1d(around, torn)
     curve = _through(tuple(beside - torn[0]), tuple(torn - torn[0])) @ y[beside]
     height = np.abs(y[torn] - curve)
-    steepest = max(
-        np.abs(np.diff(y[part])).max(initial=0.0) for part in (beside[beside < torn[0]], beside[beside > torn[-1]])
-    )
+    steps = np.concatenate([np.diff(y[part]) for part in (beside[beside < torn[0]], beside[beside > torn[-1]])])
+    steepest = np.abs(steps).max(initial=0.0)
     nearest = beside[(beside > torn[0] - BESIDE) & (beside < torn[-1] + BESIDE)]
     outside = _outside(y[torn], y[nearest])
     if np.all(height > STEEP * steepest):
-        # Of a fast motion a high spike may be in the range of the samples beside it; not about the line through these.
-        slope = np.polyfit(beside, y[beside], 1)[0]
+        # Of a fast motion a high spike may be in the range of the samples beside it; not about the slope on both sides.
+        slope = np.mean(steps)
         outside = np.maximum(outside, _outside(y[torn] - slope * torn, y[nearest] - slope * nearest))
     limit *= 1.0 if beside.size >= 2 * BESIDE else ONE_SIDED
     if np.any(height <= max(limit, steepest)) or np.any(outside < OUTSIDE * height):
