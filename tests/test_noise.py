@@ -146,6 +146,13 @@ def test_torn_samples_beyond_the_limit_do_not_hide_that_a_channel_is_clipped():
     assert sensor.at == ("displacement", 1) and sensor.value == level
 
 
+def test_a_record_too_short_to_be_fitted_is_refused_as_a_record():
+    time = DT * np.arange(10)
+    record = jfsm.Record(time, force=np.sin(time), displacement=np.cos(3 * time))
+    with pytest.raises(ValueError, match="`record` must hold at least 32 samples"):
+        jfsm.diagnose(record, jfsm.Structure.sdof(1.0, 1.0, 0.1))
+
+
 def test_a_quantised_channel_is_not_clipped_for_meeting_its_end_levels():
     y = np.sin(np.arange(20_000) * 0.013)
     coarse = np.round(y / 0.02) * 0.02

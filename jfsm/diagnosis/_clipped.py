@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..identification import LEAST_SAMPLES
 from ..records import Record, clipped, noise_floor, spikes
 from ..structures import Clipping, Structure, causes
 from ._class import class_of
@@ -23,11 +24,12 @@ _SAME = 1e-9
 def limited(records: Sequence[Record], model: Structure) -> list[Clipping]:
     """The clipped channels of which the model knows nothing, with their limits; those cut off alike on both sides.
 
-    Where a motion is imposed none is told: friction alone may hold the force at one level, and a rig its motion.
+    Where a motion is imposed none is told: friction alone may hold the force at one level, and a rig its motion. Nor is
+    any of a record that is too short to be fitted.
     """
     known = {s.at for s in model.sensors if isinstance(s, Clipping)}
     found: dict[tuple[str, int], float] = {}
-    for record in (r for r in records if r.drive == "force"):
+    for record in (r for r in records if r.drive == "force" and len(r) >= LEAST_SAMPLES):
         for channel, samples in record.channels.items():
             torn = spikes(samples, noise_floor(samples, record.dt).std)
             cut = clipped(samples, torn)

@@ -11,6 +11,7 @@ from ._maximise import finish as finish
 from ._maximise import maximise as maximise
 from ._maximise import rungs as rungs
 from ._maximise import settle as settle
+from ._nuisances import LEAST_SAMPLES as LEAST_SAMPLES
 from ._nuisances import Nuisances as Nuisances
 from ._nuisances import prepare as prepare
 from ._nuisances import prepare_all as prepare_all

@@ -29,6 +29,8 @@ from ..records import NoiseFloor, Record, bridged, clipped, declipped, noise_flo
 from ..structures import Structure
 from ._colour import Colour
 
+LEAST_SAMPLES = 32
+"""Of a record that is fitted."""
 _LEAST_NOISE = 1e-4
 """Noise of a channel as a share of its size, at least: below it the integration error would be taken for physics."""
 _LEAST_DISTURBANCE = 2e-4
@@ -265,8 +267,10 @@ def prepare(
             if record.drive == "force"
             else '`record` has drive="motion" and must hold the force that was measured; it has none to compare with.'
         )
-    if len(record) < 32:
-        raise ValueError(f"`record` must hold at least 32 samples to tell noise from motion; it has {len(record)}.")
+    if len(record) < LEAST_SAMPLES:
+        raise ValueError(
+            f"`record` must hold at least {LEAST_SAMPLES} samples to tell noise from motion; it has {len(record)}."
+        )
     if record.drive == "motion":
         return _prepare_imposed(record, model, reconstruction)
     channels = tuple(record.responses)

@@ -22,15 +22,8 @@ STEEP = 4.0  # times as high as the motion goes between samples, from which a sp
 ALONE = 3.0  # times as far off as anything that is left around it: where a channel rattles, its crests are no spikes
 OFF_CURVE = np.array([-1.0, 6.0, -15.0, 20.0, -15.0, 6.0, -1.0]) / 20.0  # a sample minus the quintic through six beside
 BESIDE = 3  # samples on either side of a spike that make its curve
-TORN = (
-    (0,),
-    (0, 1),
-    (-1, 0),
-    (0, 2),
-    (-2, 0),
-    (0, 3),
-    (-3, 0),
-)  # which samples a spike takes, beside the one farthest off
+# Which samples a spike takes, beside the one that is farthest off.
+TORN = ((0,), (0, 1), (-1, 0), (0, 2), (-2, 0), (0, 3), (-3, 0))
 PASSES = 2  # of three that are close together, the third is seen once the others are mended
 ONE_SIDED = 2.0  # times as far off where the curve ends beside a spike and goes on by itself
 
