@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..identification import LEAST_SAMPLES
-from ..records import Record, clipped, noise_floor, spikes
+from ..records import Record, defects
 from ..structures import Clipping, Structure, causes
 from ._class import class_of
 from ._decide import Decision
@@ -31,8 +31,7 @@ def limited(records: Sequence[Record], model: Structure) -> list[Clipping]:
     found: dict[tuple[str, int], float] = {}
     for record in (r for r in records if r.drive == "force" and len(r) >= LEAST_SAMPLES):
         for channel, samples in record.channels.items():
-            torn = spikes(samples, noise_floor(samples, record.dt).std)
-            cut = clipped(samples, torn)
+            cut, torn = defects(samples, record.dt)
             size = float(np.max(np.abs(samples[~torn])))
             there = np.abs(samples[cut])
             if channel not in known and cut.mean() > _NOTICEABLE and np.all(there >= size * (1 - _SAME)):

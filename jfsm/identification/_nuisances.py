@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -14,8 +13,6 @@ from ..dynamics._excitation import (
     bucket,
     excitation,
     fastest_mode,
-    force_limits,
-    measured_force,
     substeps_for,
     typical_size,
 )
@@ -25,22 +22,15 @@ from ..dynamics._plant import Channel, Readout, lower, readout
 from ..dynamics._simulate import check_pair
 from ..dynamics._start import starting_state
 from ..estimation._filter import ProcessNoise, Readings
-from ..records import NoiseFloor, Record, bridged, clipped, declipped, noise_floor, quantisation_step, spikes, tones
+from ..records import Record, clipped, noise_floor, quantisation_step, spikes
 from ..structures import Structure
+from ._channels import FINEST, LEAST_NOISE, driving, forces, readings_of, spread_of
 from ._colour import Colour
 
 LEAST_SAMPLES = 32
 """Of a record that is fitted."""
-_LEAST_NOISE = 1e-4
-"""Noise of a channel as a share of its size, at least: below it the integration error would be taken for physics."""
 _LEAST_DISTURBANCE = 2e-4
 """Acceleration that is never explained, as a share of its size, white over a radian of the motion."""
-_BAND_LIMITED = 1e-3
-"""Noise of a channel whose signal fills its band, as a share of its size: nothing in it tells."""
-_FINEST = 2
-"""Samples per knot at which a spline's residual holds signal as well."""
-_OVERSAMPLED = 3
-"""Samples per knot from which a spline's curve may stand for the force: the band above holds noise only."""
 _MOSTLY = 0.5
 _SAME = 1e-9
 """Rounding, relative."""
@@ -50,8 +40,6 @@ _LEADING = 4096
 """Readings, the first ones, that lead to a basin,"""
 _LOUD = 0.25
 """where their power is such a share of that of all, at least."""
-_STRETCH = 0.25
-"""Share of a channel's samples, one after the other, that are enough to read its noise from."""
 
 
 @dataclass(frozen=True)
@@ -274,11 +262,10 @@ def prepare(
     if record.drive == "motion":
         return _prepare_imposed(record, model, reconstruction)
     channels = tuple(record.responses)
-    values = np.column_stack([record.responses[c] for c in channels])
-    values, use, floor, trusted, lost = _noise(channels, values, record.dt)
-    spread = np.std(values, axis=0)
-    force, words = _force(record, model)
-    base = None if record.base_acceleration is None else _told(record.base_acceleration, record.dt)
+    seen = readings_of(channels, np.column_stack([record.responses[c] for c in channels]), record.dt)
+    values, floor, spread = seen.values, seen.floor, np.std(seen.values, axis=0)
+    force, words = forces(record, model)
+    base = None if record.base_acceleration is None else driving(record.base_acceleration, record.dt)
     omega = fastest_mode(lower(model)) or _rate(values[:, 0], record.dt)
     length, crest = _size(channels, values, spread, omega)
     mass = _mass(weighed or model)
@@ -296,14 +283,14 @@ def prepare(
         channels=channels,
         show=readout(channels, model.dof),
         fine=_drive(record, model, reconstruction, force.samples, None if base is None else base.samples),
-        readings=_padded(values, use, variance),
+        readings=_padded(values, seen.use, variance),
         noise=_disturbance(mass, covariance, omega, length, record.dt),
         force_floor=force.floor,
         base_floor=0.0 if base is None else base.floor,
         force_covariance=covariance,
         spread=spread,
         floor=floor,
-        trusted=trusted,
+        trusted=seen.trusted,
         length=length,
         crest=crest,
         omega=omega,
@@ -312,7 +299,7 @@ def prepare(
         v0=v0,
         at_rest=record.at_rest,
         reconstruction=reconstruction,
-        notes=(*record.notes, *lost, *words),
+        notes=(*record.notes, *seen.notes, *words),
     )
 
 
@@ -344,12 +331,12 @@ def _prepare_imposed(record: Record, model: Structure, reconstruction: Reconstru
     """Nuisances of a record whose motion is imposed: its readings are those of the force."""
     channels, path = tuple(record.channels), imposed_motion(record, model)
     values = np.column_stack([record.channels[c] for c in channels])
-    spread, floor, trusted, use = _spread(channels, values), *np.zeros((2, len(channels))), np.zeros_like(values)
+    spread, floor, trusted, use = spread_of(channels, values), *np.zeros((2, len(channels))), np.zeros_like(values)
     notes = []
     for i, (kind, j) in enumerate(channels):
         found = noise_floor(values[:, i], record.dt)
-        trusted[i] = found.spacing > _FINEST
-        floor[i] = max(noise_of(found, spread[i]), _LEAST_NOISE * spread[i])
+        trusted[i] = found.spacing > FINEST
+        floor[i] = max(noise_of(found, spread[i]), LEAST_NOISE * spread[i])
         if kind == "force":
             lost = clipped(values[:, i])
             # A force that stays at its extremes for most of the time is dry friction, not the end of a range.
@@ -391,54 +378,6 @@ def _prepare_imposed(record: Record, model: Structure, reconstruction: Reconstru
 def _mass(structure: Structure) -> np.ndarray:
     masses = np.asarray(structure.mass)
     return np.diag(masses) if masses.ndim == 1 else masses
-
-
-def _spread(channels: tuple[Channel, ...], values: np.ndarray) -> np.ndarray:
-    """Standard deviation of each channel; a dead one is refused."""
-    spread = np.std(values, axis=0)
-    for (kind, j), size in zip(channels, spread, strict=True):
-        if size == 0:
-            raise ValueError(f"`{kind}` {j} is constant; leave a dead channel out of the record.")
-    return spread
-
-
-def _noise(
-    channels: tuple[Channel, ...], values: np.ndarray, dt: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[str]]:
-    """Readings (n, channels) without spikes, which of them take part, standard deviation of each channel's noise,
-    whether it is trusted, and notes."""
-    use, floor, trusted = np.ones_like(values), np.zeros(len(channels)), np.zeros(len(channels), dtype=bool)
-    values, spread, notes = values.copy(), _spread(channels, values), []
-    for i, (kind, j) in enumerate(channels):
-        torn = spikes(values[:, i], noise_floor(values[:, i], dt).std)
-        cut = clipped(values[:, i], torn)
-        found = _noise_floor(bridged(values[:, i], torn), cut, dt)
-        trusted[i] = found.spacing > _FINEST
-        std = found.std if trusted[i] else min(found.std, _BAND_LIMITED * spread[i])
-        floor[i] = max(std, _LEAST_NOISE * spread[i])
-        torn = spikes(values[:, i], floor[i])
-        lost = cut | torn
-        values[:, i] = bridged(values[:, i], torn)
-        if np.any(lost):
-            use[lost, i] = 0.0
-            notes.append(f"{kind} {j}: {int(lost.sum())} clipped or torn samples take no part.")
-    return values, use, floor, trusted, notes
-
-
-def _noise_floor(samples: np.ndarray, cut: np.ndarray, dt: float) -> NoiseFloor:
-    """Noise of a channel, some of whose samples were cut off: the corners that they leave are none.
-
-    It is read from the longest stretch without them; where each is short, from the curve with its arcs put back.
-    """
-    edges = np.flatnonzero(np.concatenate([[True], cut, [True]]))
-    longest = int(np.argmax(np.diff(edges)))
-    begin, end = edges[longest], edges[longest + 1] - 1
-    if end - begin >= _STRETCH * len(samples):
-        return noise_floor(samples[begin:end], dt)
-    limit = float(np.max(np.abs(samples[cut])))
-    alike = np.mean(cut) < _MOSTLY and np.all(np.abs(samples[cut]) >= limit * (1 - _SAME))
-    found = noise_floor(declipped(samples, limit) if alike else samples, dt)
-    return replace(found, std=found.std / math.sqrt(1.0 - np.mean(cut)))  # arcs that are put back hold none
 
 
 def _padded(values: np.ndarray, use: np.ndarray, variance: np.ndarray) -> Readings:
@@ -493,66 +432,6 @@ def _period(model: Structure, omega: float) -> float:
     if fastest_mode(plant) > 0 or not np.all(rates > 0):
         return 2 * math.pi / omega
     return _STOPPED / float(np.max(rates))
-
-
-class _Force(NamedTuple):
-    """Force samples (n, dof) to run with, and their noise as in `_Told`, each (dof,)."""
-
-    samples: np.ndarray
-    floor: np.ndarray
-    by_sample: np.ndarray
-    in_motion: np.ndarray
-
-
-class _Told(NamedTuple):
-    """Samples (n,) of a channel that drives, to run with, and their noise.
-
-    `floor` is the standard deviation with which they were measured; `by_sample` the variance that smoothing leaves in a
-    sample, and `in_motion` that of white noise as strong as what it leaves where the structure moves.
-    """
-
-    samples: np.ndarray
-    floor: float
-    by_sample: float
-    in_motion: float
-
-
-def _force(record: Record, model: Structure) -> tuple[_Force, list[str]]:
-    """Force samples (n, dof) to run with, and notes."""
-    restored, dof, notes = force_limits(model), model.dof, []
-    force = measured_force(record, dof, restored)
-    std, by_sample, in_motion = np.zeros((3, dof))
-    for (kind, j), samples in record.channels.items():
-        if kind != "force":
-            continue
-        if not np.any(force[:, j - 1]):
-            if np.any(samples):
-                notes.append(f"force {j} holds nothing but noise and counts as zero.")
-            continue
-        if (kind, j) not in restored and np.any(clipped(samples)):
-            notes.append(
-                f"force {j} looks clipped; its true peaks are not known, which shows as an unexplained effect."
-            )
-        force[:, j - 1], std[j - 1], by_sample[j - 1], in_motion[j - 1] = _told(force[:, j - 1], record.dt)
-    return _Force(force, std, by_sample, in_motion), notes
-
-
-def _told(samples: np.ndarray, dt: float) -> _Told:
-    """What drives, as a channel tells it.
-
-    Where it is smooth on its own grid, its noise is smoothed away. A spline leaves all of it in the band of the motion,
-    a sum of tones next to nothing. Where the channel fills its band, the spline's residual is signal, and the noise is
-    taken as a thousandth of the channel.
-    """
-    floor = noise_floor(samples, dt)
-    if floor.spacing < _OVERSAMPLED:
-        std = _BAND_LIMITED * float(np.std(samples))
-        return _Told(samples, std, std**2, std**2)
-    few = tones(samples, floor)
-    parameters = floor.effective_parameters if few is None else few.parameters
-    by_sample = floor.std**2 * parameters / samples.size
-    curve, in_motion = (floor.smooth, floor.std**2) if few is None else (few.curve, by_sample)
-    return _Told(curve, floor.std, by_sample, in_motion)
 
 
 def _size(channels: tuple[Channel, ...], values: np.ndarray, spread: np.ndarray, omega: float) -> tuple[float, float]:

@@ -6,6 +6,7 @@ from jfsm.records._combine import join as join
 from jfsm.records._declip import declipped as declipped
 from jfsm.records._defects import bridged as bridged
 from jfsm.records._defects import clipped as clipped
+from jfsm.records._defects import defects as defects
 from jfsm.records._defects import spikes as spikes
 from jfsm.records._noise_floor import NoiseFloor as NoiseFloor
 from jfsm.records._noise_floor import noise_floor as noise_floor

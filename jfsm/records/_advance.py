@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from jfsm.records._defects import bridged, clipped, spikes
-from jfsm.records._noise_floor import noise_floor
+from jfsm.records._defects import bridged, defects
 from jfsm.records._resample import filtered
 
 Samples = NDArray[np.float64]
@@ -12,7 +11,6 @@ Samples = NDArray[np.float64]
 
 def advanced(y: Samples, samples: float, dt: float) -> Samples:
     """A channel (n,) so many of its samples later, band-limited between them; clipped and torn ones stay."""
-    torn = spikes(y, noise_floor(y, dt).std)
-    left = clipped(y, torn) | torn
+    left = np.logical_or(*defects(y, dt))
     index = np.arange(y.size, dtype=np.float64)
     return np.where(left, y, filtered(bridged(y, left)[:, None], index + samples, 1.0)[:, 0])

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import maximum_filter1d, median_filter
 
+from jfsm.records._noise_floor import noise_floor
 from jfsm.records._quantisation import quantisation_step
 
 CLIPPED_SAMPLES = 6  # at one end level; a continuous signal is there once
@@ -103,6 +104,13 @@ def spikes(y: ArrayLike, std: float) -> NDArray[np.bool_]:
     left = _off_curve(y)
     left[:BESIDE] = left[-BESIDE:] = 0.0  # of the ends no curve tells
     return mask & (height > ALONE * maximum_filter1d(left, SURROUNDING))
+
+
+def defects(y: ArrayLike, dt: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which samples (n,) of a channel are no readings: those at the limit of its recorder, and those torn out of it."""
+    y = np.asarray(y, dtype=np.float64)
+    torn = spikes(y, noise_floor(y, dt).std)
+    return clipped(y, torn), torn
 
 
 def bridged(y: NDArray[np.float64], lost: NDArray[np.bool_]) -> NDArray[np.float64]:
