@@ -272,9 +272,8 @@ def _made(leading: Leading, test: Variation, truth: Trial, rng: np.random.Genera
 
 
 def _rests(structure: Structure) -> list[tuple[tuple[int, int], float]]:
-    """Stretches of links, other than none, at which a structure of one mass may rest."""
-    laws = structure.terms if structure.dof == 1 else ()
-    return [(law.at, rest) for law in laws for rest in law.rests(structure.stiffness_of(law.at))]
+    """Where a structure of one mass may rest, other than at zero."""
+    return structure.rests() if structure.dof == 1 else []
 
 
 def _plan(record: Record, test: Variation, *, known: bool = True) -> Record:

@@ -26,7 +26,7 @@ def unsteady(t: Trial, problem: Problem) -> list[str]:
 
     Nothing is said of a structure with several rests: on the hill between them a small error grows by itself.
     """
-    if any(term.rests(t.structure.stiffness_of(term.at)) for term in t.structure.terms):
+    if t.structure.rests():
         return []
     posterior, words = problem.posterior_of(t), []
     for index, nuisances in enumerate(problem.records):

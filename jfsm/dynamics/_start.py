@@ -77,13 +77,9 @@ def _least_squares(model: Structure, head: Record, reconstruction: Reconstructio
 
 def _rests(model: Structure, channels: tuple[Channel, ...]) -> list[np.ndarray]:
     """States of rest away from zero, of masses that a law holds there and whose displacement is not measured."""
-    found = []
-    for law in model.terms:
-        ground, j = sorted(law.at)
-        if ground == 0 and ("displacement", j) not in channels:
-            for rest in law.rests(model.stiffness_of(law.at)):
-                found.append(np.where(np.arange(2 * model.dof) == j - 1, rest, 0.0))
-    return found
+    grounded = [(max(at), rest) for at, rest in model.rests() if min(at) == 0]
+    unseen = [(j, rest) for j, rest in grounded if ("displacement", j) not in channels]
+    return [np.where(np.arange(2 * model.dof) == j - 1, rest, 0.0) for j, rest in unseen]
 
 
 def _descended(known: tuple, state: np.ndarray) -> tuple[float, np.ndarray]:

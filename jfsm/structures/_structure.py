@@ -168,6 +168,10 @@ class Structure(eqx.Module):
         """Stiffness of all linear springs of a link together."""
         return sum(float(t.k) for t in self.terms if isinstance(t, LinearStiffness) and set(t.at) == set(link))
 
+    def rests(self) -> list[tuple[tuple[int, int], float]]:
+        """Links and the relative displacements, other than none, at which one of their laws lets them rest."""
+        return [(law.at, rest) for law in self.terms for rest in law.rests(self.stiffness_of(law.at))]
+
     def __add__(self, other: AbstractTerm | AbstractSensor) -> "Structure":
         if isinstance(other, AbstractTerm):
             return Structure(self.mass, (*self.terms, other), self.sensors, self.trust)
