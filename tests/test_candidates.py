@@ -16,6 +16,7 @@ from jfsm.diagnosis._candidates import (
     candidates,
     chosen_causes,
     contained,
+    elsewhere,
     hypothesis,
     own_paths,
     promising,
@@ -88,6 +89,14 @@ def test_the_special_cases_of_a_law_are_followed_where_it_is(shaken):
 def test_a_special_case_that_explains_nothing_is_not_followed():
     idle = Candidate((Effect(chosen_causes(["jenkins"])["jenkins"], (0, 1)),), ())
     assert contained([jfsm.FreePlay(1.0, 0.1, 1.0, 1.0, at=(0, 1))], [idle]) == []
+
+
+def test_a_law_that_was_found_is_tried_at_the_other_places(shaken):
+    known = chosen_causes(["cubic_hardening", "coulomb", "force_gain"])
+    tried = candidates(CHAIN, [shaken], known)
+    found = next(c for c in tried if c.effects == (Effect(known["cubic_hardening"], (1, 2)),))
+    others = elsewhere(found.effects, [c for c in tried if c is not found])
+    assert [c.effects for c in others] == [(Effect(known["cubic_hardening"], (0, 1)),)]
 
 
 @pytest.mark.parametrize(("channel", "tried"), [("acceleration", True), ("displacement", False)])

@@ -184,6 +184,15 @@ def as_promising(effects: tuple[Effect, ...], tried: Sequence[Candidate], left: 
     return [c for c in left if c.starts and c.share is not None and c.share >= _HARDLY_LESS * found]
 
 
+def elsewhere(effects: tuple[Effect, ...], left: Sequence[Candidate]) -> list[Candidate]:
+    """Candidates left out that are the cause that was found, at another place.
+
+    Where not all motions are seen, regression tells the place less well than the law.
+    """
+    found = {effect.cause.effect for effect in effects}
+    return [c for c in left if c.starts and all(effect.cause.effect in found for effect in c.effects)]
+
+
 def may_rest_anywhere(structure: Structure, nuisances: Nuisances) -> bool:
     """Whether one degree of freedom moves about a rest of which nothing tells where it is."""
     return structure.dof == 1 and not nuisances.at_rest and not _tells_where(nuisances)

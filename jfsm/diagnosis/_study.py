@@ -12,7 +12,7 @@ from ..records import Record
 from ..structures import Cause, Structure
 from ._adequacy import GATE, MUCH, NEGLIGIBLE, explained, white
 from ._between import differ
-from ._candidates import Apart, Candidate, as_promising, candidates, contained, promising
+from ._candidates import Apart, Candidate, as_promising, candidates, contained, elsewhere, promising
 from ._chance import beside_chance, noise_beyond
 from ._coloured import coloured
 from ._effect import Effect
@@ -168,7 +168,8 @@ class Study:
         if settled(told([given, refitted, *found.trials])):
             best = max(found.trials, key=lambda t: t.evidence)
             more = contained([law for t in close(found.trials) for law in t.laws], left_out)
-            more += [c for c in as_promising(best.effects, every, left_out) if c not in more]
+            others = [*as_promising(best.effects, every, left_out), *elsewhere(best.effects, left_out)]
+            more += [c for c in dict.fromkeys(others) if c not in more]
         else:  # of a missing force that is ill seen regression may put the right law last
             more = [c for c in left_out if c.starts]
         if more:
