@@ -10,7 +10,7 @@ import pytest
 
 import jfsm
 
-from . import draw
+from . import draw, draw_chain
 
 LAWS = ("cubic_hardening", "cubic_softening", "quadratic_stiffness", "quadratic_damping", "coulomb")
 GAINS = ("force_gain", "accel_gain")
@@ -50,3 +50,18 @@ def test_what_was_hidden_is_said_and_nothing_else(seed, cause):
     assert d.gain is not None
     if d.gain.before > 1.5 * d.gain.floor:
         assert d.gain.closed > 0.9
+
+
+@pytest.mark.slow
+def test_a_late_force_is_found_at_its_link_where_the_other_mass_alone_is_seen():
+    challenge = draw_chain(219104)
+    assert (challenge.cause, challenge.at, challenge.driven) == ("delayed_force", (0, 1), 1)
+    assert list(challenge.channels) == ["force", "displacement"] and list(challenge.channels["displacement"]) == [2]
+    channels: dict[str, Any] = dict(challenge.channels)
+    record = jfsm.Record(challenge.time, at_rest=challenge.at_rest, **channels)
+    believed = challenge.model
+    springs = [jfsm.LinearStiffness(k, at=at) for at, k in believed.stiffness.items()]
+    dashpots = [jfsm.LinearDamping(c, at=at) for at, c in believed.damping.items()]
+    model = jfsm.Structure(list(believed.mass), [*springs, *dashpots])
+    d = jfsm.diagnose(record, model, holdout=0.3, key=jax.random.key(219104))
+    assert [(found.cause, tuple(found.at)) for found in d.findings] == [("delayed_force", (0, 1))]
