@@ -5,7 +5,8 @@ from typing import Any
 import jax
 import numpy as np
 import pytest
-from test_diagnose import DAMPING, FEW, MASS, STIFFNESS, duffing, linear, made
+from scipy.integrate import solve_ivp
+from test_diagnose import DAMPING, FEW, MASS, STEP, STIFFNESS, duffing, linear, made
 
 import jfsm
 
@@ -39,6 +40,27 @@ def test_what_a_law_makes_slow_is_not_taken_for_a_zero():
 
     d = jfsm.diagnose(made(one_sided), RIGHT, causes=FEW, key=jax.random.key(0))
     assert [f.cause for f in d.findings] == ["quadratic_stiffness"] and not any("wanders" in note for note in d.notes)
+
+
+def test_a_rest_that_moves_with_the_amplitude_is_not_left_to_a_zero():
+    """A sweep through the resonance of a softening spring under a load: its mean goes off and comes back."""
+    time = np.arange(2000) * STEP
+
+    def force(t):
+        return 2.0 * np.sin((1.5 + 0.015 * t) * t)
+
+    def slope(t, y):
+        return [y[1], (force(t) - linear(*y) + 4.0 * y[0] ** 3 - 6.0) / MASS]
+
+    rest = np.roots([-4.0, 0.0, STIFFNESS, 6.0]).real
+    begin = [rest[np.argmin(np.abs(rest))], 0.0]
+    x = solve_ivp(slope, (0.0, time[-1]), begin, t_eval=time, rtol=1e-10, atol=1e-12).y[0]
+    rng = np.random.default_rng(0)
+    g, x = (y + 0.001 * y.std() * rng.standard_normal(time.size) for y in (force(time), x))
+    d = jfsm.diagnose(jfsm.Record(time, g, x), RIGHT, causes=["preload", "cubic_softening"], key=jax.random.key(0))
+    assert {f.cause for f in d.findings} == {"preload", "cubic_softening"}
+    assert not any("wanders" in note for note in d.notes)
+    assert d.gain is not None and d.gain.closed > 0.9
 
 
 def test_of_few_periods_what_a_law_makes_is_not_taken_for_a_zero():

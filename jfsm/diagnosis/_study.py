@@ -108,7 +108,10 @@ class Study:
         self, problem: Problem, given: Trial, refitted: Trial, known: Trial | None
     ) -> tuple[Problem, list[Candidate], Searched]:
         """What could be tried, and what was found; the zeros of channels may turn out to wander, or their noise to
-        have a memory."""
+        have a memory.
+
+        What the model lacks may have looked like that: then what was found holds as well without.
+        """
         channel = wandering(refitted, problem, PLAINLY)
         other = None if channel is None else problem.with_wandering(channel)
         if other is None:
@@ -117,7 +120,13 @@ class Study:
             if isinstance(found, Searched):
                 return problem, every, found
             other = found
-        return self._sought(*_believed(other, near=refitted), known)
+        other, every, found = self._sought(*_believed(other, near=refitted), known)
+        best = max(found.every, key=lambda t: t.evidence)
+        if best.effects:
+            [alone] = search_again([best], refitted, problem, self.tell).trials
+            if alone.evidence >= best.evidence:
+                return problem, every, self._fitted_again(found, given, refitted, problem)
+        return other, every, found
 
     def _fitted_again(self, ahead: Searched, given: Trial, refitted: Trial, problem: Problem) -> Searched:
         """The best of what was found in another problem, as in pieces of long records, fitted from there."""
