@@ -37,6 +37,7 @@ from jfsm.reporting._quantities import (
     rate_unit,
     with_error,
 )
+from jfsm.reporting._tables import candidates_table
 from jfsm.reporting._wording import listed, place_name
 
 VERDICTS = ("consistent", "parameters", "cause", "unnamed", "undecided")
@@ -321,6 +322,12 @@ def test_text_of_a_cause_says_where_how_sure_how_large_and_what_else_it_may_be()
         "99.7 %",
     ):
         assert words in text
+
+
+def test_what_predicts_worse_than_without_explains_nothing():
+    """A law that sticks may run far off; by how much is no share of anything."""
+    [row] = candidates_table([candidate("jenkins", 54000.0, -2.4e9, 0.0, "explains 0% of what a refit leaves")]).rows
+    assert "0 %" in row and not any("−" in cell for cell in row)
 
 
 def test_a_narrow_terminal_shows_whole_words_and_leaves_errors_and_reasons_to_the_page():

@@ -105,7 +105,7 @@ def candidates_table(candidates: Sequence[Dictionary]) -> Table:
             place_name(candidate.get("at")),
             number(candidate.get("evidence"), 4),
             *(percent((candidate.get("error") or {}).get(name)) for name in sets),
-            percent(candidate.get("kappa")),
+            _explained(candidate.get("kappa")),
             probability(candidate.get("probability")),
             candidate.get("why") or "",
         )
@@ -115,6 +115,11 @@ def candidates_table(candidates: Sequence[Dictionary]) -> Table:
     headings = ("cause", "place", "evidence [nats]", *errors, "explains", "probability", "why")
     strong = frozenset(row for row, candidate in enumerate(candidates) if candidate.get("why") == "named")
     return Table("Candidates", headings, rows, _words(0, 1, len(headings) - 1), strong)
+
+
+def _explained(share: float | None) -> str:
+    """A share of the error that is explained; what predicts worse than without explains none of it."""
+    return percent(None if share is None else max(share, 0.0))
 
 
 def refitted_table(refitted: Mapping[str, Dictionary]) -> Table:
