@@ -185,7 +185,7 @@ def as_promising(effects: tuple[Effect, ...], tried: Sequence[Candidate], left: 
 
 
 def elsewhere(effects: tuple[Effect, ...], left: Sequence[Candidate]) -> list[Candidate]:
-    """Candidates left out that are the cause that was found, at another place.
+    """Candidates left out whose law is the one that was found, of either sign: as a rule at other places.
 
     Where not all motions are seen, regression tells the place less well than the law.
     """

@@ -76,9 +76,9 @@ def spikes(y: ArrayLike, std: float) -> NDArray[np.bool_]:
     Returns
     -------
     mask : (n,) bool array
-        One sample or two, side by side or with one between them, off the running median of five by more than 6 floors,
-        off the curve through their neighbours by more than 8 robust standard deviations of the samples around, and by
-        three times what remains around them when the spikes are gone.
+        One sample or two, side by side or with up to two between them, off the running median of five by more than 6
+        floors, off the curve through their neighbours by more than 8 robust standard deviations of the samples around,
+        and by three times what remains around them when the spikes are gone.
 
     Notes
     -----
