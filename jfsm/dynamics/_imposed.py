@@ -183,7 +183,7 @@ def imposed_substeps(structure: Structure, dt: float, size: Size) -> int:
 
 def noise_of(floor: NoiseFloor, size: float) -> float:
     """Noise of a channel; where the signal fills its band, what is surely none of it."""
-    if floor.spacing > _FINEST:
+    if not floor.fills_band:
         return floor.std
     return max(min(floor.std, _BAND_LIMITED * size), floor.std - 2 * floor.std_error)
 

@@ -15,8 +15,8 @@ from ._observable import Place, told_apart
 from ._resonator import Data, Kind, Numbers
 
 _RESPONSES = ("displacement", "velocity", "acceleration")
-_FINEST, _OVERSAMPLED = 2, 3
-"""Samples per knot of a spline: its residual holds signal too; from here on its curve may stand for a force."""
+_OVERSAMPLED = 3
+"""Samples per knot from which a spline's curve may stand for a force."""
 _LEAST_NOISE = 1e-4
 _FULL_BAND = 1e-3
 """Noise of a force whose signal fills its band, as a share of its size at most: nothing in it tells."""
@@ -100,7 +100,7 @@ class Part:
         acts = np.std(force, 0) > 0
         size = np.std(force, 0)[acts]
         gain = np.zeros((len(dofs), len(size))) if minv is None else minv[:, acts] * size / (length * omega**2)
-        doubt = np.array([0.2 if floor.spacing > _FINEST else 3.0 for floor in floors])
+        doubt = np.array([3.0 if floor.fills_band else 0.2 for floor in floors])
         return cls(
             dofs, channels, omega, length, dt, (seen - base[:, None] * absolute) / sizes, use.astype(float), spiky,
             sizes, noise / sizes, doubt, force[:, acts] / size, rough[acts] / size, vague[acts],
@@ -166,10 +166,12 @@ def _forces(record: Record, dof: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
     for j in range(dof):
         if np.any(force[:, j]):
             floor = noise_floor(force[:, j], record.dt)
-            if floor.spacing >= _OVERSAMPLED:
-                force[:, j] = floor.smooth
-                rough[j], vague[j] = floor.std * np.sqrt(floor.effective_parameters / len(record)), 1.0
-            else:
+            if floor.fills_band or floor.silent:
                 rough[j], vague[j] = min(floor.std, _FULL_BAND * np.std(force[:, j])), 3.0
+            elif floor.spacing < _OVERSAMPLED:
+                rough[j] = floor.std
+            else:
+                force[:, j] = floor.smooth
+                rough[j] = floor.std * np.sqrt(floor.effective_parameters / len(record))
             rough[j] = max(rough[j], _LEAST_NOISE * np.std(force[:, j]))
     return force, rough, vague

@@ -13,8 +13,6 @@ from ..structures import Structure
 
 LEAST_NOISE = 1e-4
 """Noise of a channel as a share of its size, at least: below it the integration error would be taken for physics."""
-FINEST = 2
-"""Samples per knot at which a spline's residual holds signal as well."""
 _BAND_LIMITED = 1e-3
 """Noise of a channel whose signal fills its band, as a share of its size: nothing in it tells."""
 _OVERSAMPLED = 3
@@ -66,7 +64,7 @@ def readings_of(channels: tuple[Channel, ...], values: np.ndarray, dt: float) ->
     for i, (kind, j) in enumerate(channels):
         cut, torn = defects(values[:, i], dt)
         found = _noise_floor(bridged(values[:, i], torn), cut, dt)
-        trusted[i] = found.spacing > FINEST
+        trusted[i] = not found.fills_band
         std = found.std if trusted[i] else min(found.std, _BAND_LIMITED * spread[i])
         floor[i] = max(std, LEAST_NOISE * spread[i])
         torn = spikes(values[:, i], floor[i])
@@ -127,12 +125,13 @@ def driving(samples: np.ndarray, dt: float) -> Driving:
     """What drives, as a channel tells it.
 
     Where it is smooth on its own grid, its noise is smoothed away. A spline leaves all of it in the band of the motion,
-    a sum of tones next to nothing. Where the channel fills its band, the spline's residual is signal, and the noise is
-    taken as a thousandth of the channel.
+    a sum of tones next to nothing. A signal that reaches farther up stays as it was measured; if it fills the band,
+    nothing tells its noise, which is taken as a thousandth of it.
     """
     floor = noise_floor(samples, dt)
-    if floor.spacing < _OVERSAMPLED:
-        std = _BAND_LIMITED * float(np.std(samples))
+    full = floor.fills_band or floor.silent
+    if full or floor.spacing < _OVERSAMPLED:
+        std = _BAND_LIMITED * float(np.std(samples)) if full else floor.std
         return Driving(samples, std, std**2, std**2)
     few = tones(samples, floor)
     parameters = floor.effective_parameters if few is None else few.parameters

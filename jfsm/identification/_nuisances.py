@@ -24,7 +24,7 @@ from ..dynamics._start import starting_state
 from ..estimation._filter import ProcessNoise, Readings
 from ..records import Record, clipped, noise_floor, quantisation_step, spikes
 from ..structures import Structure
-from ._channels import FINEST, LEAST_NOISE, driving, forces, readings_of, spread_of
+from ._channels import LEAST_NOISE, driving, forces, readings_of, spread_of
 from ._colour import Colour
 
 LEAST_SAMPLES = 32
@@ -335,7 +335,7 @@ def _prepare_imposed(record: Record, model: Structure, reconstruction: Reconstru
     notes = []
     for i, (kind, j) in enumerate(channels):
         found = noise_floor(values[:, i], record.dt)
-        trusted[i] = found.spacing > FINEST
+        trusted[i] = not found.fills_band
         floor[i] = max(noise_of(found, spread[i]), LEAST_NOISE * spread[i])
         if kind == "force":
             lost = clipped(values[:, i])

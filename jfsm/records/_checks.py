@@ -227,20 +227,17 @@ def _of_noise(summary: ChannelSummary, floor: NoiseFloor | None) -> Iterator[Fin
     if floor.silent:
         yield Finding("info", channel, f"Noise only, {floor.std:.3g} {unit}, or too fast to be told from it.")
         return
-    at_limit = floor.spacing == SPACINGS[0] and fast_share(floor.smooth) > FAST_SHARE
-    if floor.std > NOISY_SHARE * summary.std and not at_limit:
+    fast = floor.spacing == SPACINGS[0] and fast_share(floor.smooth) > FAST_SHARE
+    if floor.std > NOISY_SHARE * summary.std and not (fast and floor.fills_band):
         level = plus_minus(floor.std, floor.std_error)
         message = f"Noise of {level} {unit}, {share(floor.std / summary.std)} of the standard deviation."
         yield Finding("warning", channel, message)
-    if floor.spacing == SPACINGS[0]:
-        if at_limit:
-            message = (
-                f"Much of the signal has fewer than {1 / FAST:.0f} samples a period: part of the noise may be signal. "
-                f"Sample faster if you can."
-            )
-            yield Finding("warning", channel, message)
-        else:
-            yield Finding("info", channel, "Bends or jumps within a sample or two; the noise level leaves that out.")
+    if fast:
+        doubt = ": part of the noise may be signal" if floor.fills_band else ""
+        message = f"Much of the signal has fewer than {1 / FAST:.0f} samples a period{doubt}. Sample faster if you can."
+        yield Finding("warning", channel, message)
+    elif floor.fills_band:
+        yield Finding("info", channel, "Bends or jumps within a sample or two; the noise level leaves that out.")
 
 
 def _of_motion(summary: ChannelSummary, uniform: Samples, dt: float) -> Iterator[Finding]:

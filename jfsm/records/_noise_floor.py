@@ -7,6 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import solveh_banded
 
+from jfsm.records._core import core_std
+from jfsm.records._flat_top import flat_top_std, spectrum_by_band
 from jfsm.records._quantisation import quantisation_step
 
 DEGREE = 5
@@ -15,15 +17,13 @@ SILENCE = 0.15  # a spline that explains less than this share of the variance ha
 INFLATED = 0.85  # a robust estimate below this share of the residual's means isolated jumps, not noise
 SHORTEST = 16  # samples; fewer cannot tell a quintic from its noise
 
-# The second moment of a standard normal variable confined to |z| < 2, by which the core of a sample is read.
-CORE = 2.0
-CORE_VARIANCE = 0.7737413035
 # Standard error of the floor: so many times that of white noise, for the choice of the spacing; and so much of what the
 # estimates differ by. Two such errors hold the truth in 98 of 100 channels of oscillators, with friction in 95.
 SCATTER, DISAGREEMENT = 1.5, 0.7
 FARTHEST = 0.25  # share of the floor that counts of a disagreement: jumps spoil two estimates, not the third
+# A spline that leaves more than this share of the variance, in a spectrum that is not white, has left signal.
+MOST_LEFT, UNEVEN = 0.1, 0.5
 STRETCHES, SHORT = 5, 200  # of a digitised channel, and samples that one has at least: at rest it shows no noise
-BANDS = 10  # of the spectrum; where a signal reaches into all but one of them, that one still shows the noise
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,11 @@ class NoiseFloor:
     explained : float
         Share of the channel's variance (about its mean) that is signal, 0 to 1.
     spacing : int
-        Samples between knots. At the finest, 2, the signal fills the band and `std` may contain part of it.
-        `std_error` then reaches down to the quietest tenth of the spectrum.
+        Samples between knots. At the finest, 2, the signal reaches farther up than a spline does, and `smooth` leaves
+        part of it.
+    fills_band : bool
+        Whether the signal reaches to the band limit as well, so that `std` may contain part of it. `std_error` then
+        reaches down to the quietest tenth of the spectrum.
     dt : float
         Sampling interval [s].
     std_error : float
@@ -54,6 +57,7 @@ class NoiseFloor:
     smooth: NDArray[np.float64]
     explained: float
     spacing: int
+    fills_band: bool
     dt: float
     std_error: float
 
@@ -73,7 +77,8 @@ def noise_floor(y: ArrayLike, dt: float) -> NoiseFloor:
 
     Quintic splines with uniform knots are fitted by least squares; generalised cross-validation chooses the spacing of
     the knots. The residual gives the noise, unless the core of the residual or of the sixth difference is clearly
-    narrower: the jumps that dry friction leaves in an acceleration widen the residual, at a few samples only.
+    narrower: the jumps that dry friction leaves in an acceleration widen the residual, at a few samples only. Where a
+    signal reaches farther up than a spline does, the noise is the flat end of the spectrum, if it has one.
 
     Parameters
     ----------
@@ -114,17 +119,21 @@ def noise_floor(y: ArrayLike, dt: float) -> NoiseFloor:
     narrowest, middle, _ = sorted(
         (
             std,
-            np.sqrt(y.size / freedom) * _core_std(residual, stretches),
+            np.sqrt(y.size / freedom) * core_std(residual, stretches),
             # 924: the sum of the squared binomial coefficients of order 6
-            _core_std(np.diff(y, 6), stretches) / np.sqrt(924.0),
+            core_std(np.diff(y, 6), stretches) / np.sqrt(924.0),
         )
     )
     if narrowest < INFLATED * std:
         std = narrowest
     apart = min(max(middle, std) - narrowest, FARTHEST * std)
+    flat = flat_top_std(y) if spacing == SPACINGS[0] else None
+    if flat is not None:
+        std, variance, apart = flat, flat**2, 0.0
     total = float(np.var(y, ddof=1))
     explained = max(0.0, 1.0 - variance / total) if total > 0 else 0.0
-    if spacing == SPACINGS[0] or explained < SILENCE:  # what is left may be signal
+    fills_band = spacing == SPACINGS[0] and flat is None
+    if fills_band or explained < SILENCE:  # what is left may be signal
         apart = max(apart, std - _quietest_std(y))
     smooth.flags.writeable = False
     return NoiseFloor(
@@ -133,15 +142,19 @@ def noise_floor(y: ArrayLike, dt: float) -> NoiseFloor:
         smooth=smooth,
         explained=explained,
         spacing=spacing,
+        fills_band=fills_band,
         dt=float(dt),
         std_error=float(np.hypot(SCATTER * std / np.sqrt(2.0 * freedom), DISAGREEMENT * apart)),
     )
 
 
 def _best_spline(y: NDArray[np.float64]) -> tuple[int, int, NDArray[np.float64]]:
-    """Spacing, number of coefficients and values of the spline with the smallest cross-validation score."""
+    """Spacing, number of coefficients and values of the spline with the smallest cross-validation score.
+
+    The score takes what is left for white; where that is much, and is not, the finest spline leaves least of a signal.
+    """
     n = y.size
-    best = (np.inf, 0, 0, y)
+    splines = []
     for spacing in SPACINGS:
         spans = max(1, (n - 1) // spacing)
         parameters = spans + DEGREE
@@ -150,9 +163,17 @@ def _best_spline(y: NDArray[np.float64]) -> tuple[int, int, NDArray[np.float64]]
         smooth = _least_squares_spline(y, spans)
         residual = y - smooth
         score = float(residual @ residual) / (n - parameters) ** 2
-        if score < best[0]:
-            best = (score, spacing, parameters, smooth)
+        splines.append((score, spacing, parameters, smooth))
+    best = min(splines)
+    left = float(np.var(y - best[-1]))
+    if left > MOST_LEFT * np.var(y) and _quietest_std(y) ** 2 < UNEVEN * left:
+        best = splines[0]
     return best[1:]
+
+
+def _quietest_std(y: NDArray[np.float64]) -> float:
+    """Standard deviation of white noise as strong as the quietest tenth of the spectrum."""
+    return float(np.sqrt(np.min(spectrum_by_band(y))))
 
 
 def _least_squares_spline(y: NDArray[np.float64], spans: int) -> NDArray[np.float64]:
@@ -166,26 +187,3 @@ def _least_squares_spline(y: NDArray[np.float64], spans: int) -> NDArray[np.floa
         if offset >= 0:
             bands[DEGREE - offset] = diagonal
     return basis @ solveh_banded(bands, basis.T @ y)
-
-
-def _quietest_std(y: NDArray[np.float64]) -> float:
-    """Standard deviation of white noise as strong as the quietest tenth of the spectrum."""
-    taper = np.hanning(y.size)
-    power = np.abs(np.fft.rfft(taper * (y - y.mean()))) ** 2 / (taper @ taper)
-    return float(np.sqrt(min(band.mean() for band in np.array_split(power, BANDS))))
-
-
-def _core_std(sample: NDArray[np.float64], stretches: int = 1) -> float:
-    """Standard deviation of the normal core of a zero-mean sample, whatever lies in its tails; the widest of so many
-    stretches."""
-    return max(_core_of(np.abs(stretch)) for stretch in np.array_split(sample, stretches))
-
-
-def _core_of(size: NDArray[np.float64]) -> float:
-    std = float(np.quantile(size, 0.3)) / 0.3853  # 30 % of a normal sample lie within 0.3853 standard deviations
-    for _ in range(20):
-        core = size[size <= CORE * std]
-        if core.size == 0 or std == 0:
-            return std
-        std = float(np.sqrt(np.mean(core**2) / CORE_VARIANCE))
-    return std
