@@ -81,6 +81,22 @@ def test_the_extended_model_closes_what_can_be_closed_on_held_out_readings(hidde
     assert hidden_cubic.extended.values()["cubic_stiffness@0-1.k3"] == pytest.approx(CUBIC, rel=0.03)
 
 
+def test_a_cubic_spring_is_named_where_white_noise_drives(believed):
+    rng = np.random.default_rng(5)
+    time = np.arange(SAMPLES) * STEP
+    force = 8.0 * rng.standard_normal(SAMPLES)
+
+    def rate(t, y):
+        return [y[1], (np.interp(t, time, force) - duffing(*y)) / MASS]
+
+    x, _ = solve_ivp(rate, (0, time[-1]), [0, 0], t_eval=time, rtol=1e-8, atol=1e-10, max_step=STEP / 2).y
+    measured = force + 0.04 * rng.standard_normal(SAMPLES)
+    record = jfsm.Record(time, measured, x + 0.005 * x.std() * rng.standard_normal(SAMPLES), at_rest=True)
+    report = jfsm.diagnose(record, believed, causes=FEW, key=jax.random.key(0))
+    assert [finding.cause for finding in report.findings] == ["cubic_hardening"]
+    assert report.findings[0].parameters["k3"].value == pytest.approx(CUBIC, rel=0.1)
+
+
 def test_own_values_are_refitted_beside_the_finding(hidden_cubic):
     assert hidden_cubic.refitted["stiffness@0-1.k"].value == pytest.approx(STIFFNESS, rel=0.01)
     assert hidden_cubic.refitted["mass@1"].value == pytest.approx(MASS, rel=0.01)

@@ -7,7 +7,9 @@ import pytest
 
 import jfsm
 from jfsm.diagnosis._clipped import limited
+from jfsm.identification._channels import driving
 from jfsm.records import clipped, noise_floor, spikes
+from jfsm.records._flat_top import flat_top_std
 
 DT = 0.02
 
@@ -95,6 +97,54 @@ def test_readings_that_rest_on_a_level_at_the_end_of_a_decay_hide_no_noise(quiet
 def test_intensity_is_the_variance_times_the_interval():
     floor = noise_floor(np.random.default_rng(5).standard_normal(500), 0.25)
     assert floor.intensity == pytest.approx(floor.std**2 * 0.25)
+
+
+def broad(top: float, seed: int, n: int = 3000) -> np.ndarray:
+    """A sum of 200 sines of any frequency up to `top` of the band, of unit size."""
+    rng = np.random.default_rng(seed)
+    phase = np.multiply.outer(np.arange(n), np.pi * top * rng.random(200)) + rng.uniform(0.0, 2 * np.pi, 200)
+    return np.cos(phase).sum(-1) / 10.0
+
+
+@pytest.mark.parametrize("top", [0.3, 0.5, 0.7])
+@pytest.mark.parametrize("level", [1e-3, 5e-3, 0.1])
+@pytest.mark.parametrize("n", [700, 3000])
+def test_noise_beyond_a_signal_that_reaches_far_up_is_the_flat_end_of_the_spectrum(top, level, n):
+    found = [
+        noise_floor(broad(top, k, n) + level * np.random.default_rng(9 + k).standard_normal(n), DT) for k in (0, 1)
+    ]
+    for floor in found:
+        assert not floor.fills_band
+        assert floor.std == pytest.approx(level, rel=0.15)
+        assert floor.explained == pytest.approx(1 - level**2, abs=0.1 * level)
+        assert abs(floor.std - level) < 3 * floor.std_error
+
+
+@pytest.mark.parametrize("kind", ["full", "square", "impacts", "walk", "torn"])
+def test_what_falls_slowly_or_jumps_has_no_flat_end_that_is_noise(kind):
+    t, rng = np.arange(3000), np.random.default_rng(2)
+    impacts = np.zeros(3000)
+    impacts[np.arange(100, 3000, 250)[:, None] + np.arange(5)] = np.sin(np.pi * np.arange(1, 6) / 6)
+    signal = {
+        "full": broad(0.98, 1),
+        "square": np.sign(np.sin(0.09 * t)),
+        "impacts": impacts,
+        "walk": np.cumsum(rng.standard_normal(3000)),
+        "torn": broad(0.3, 1) + 0.5 * (t % 300 == 150),
+    }[kind]
+    assert flat_top_std(signal / signal.std() + 1e-4 * rng.standard_normal(3000)) is None
+
+
+def test_a_force_that_reaches_beyond_a_spline_runs_as_it_was_measured():
+    noisy = {top: broad(top, 3) + 0.005 * np.random.default_rng(4).standard_normal(3000) for top in (0.3, 0.8)}
+    white = np.random.default_rng(5).standard_normal(3000)
+    for force in (*noisy.values(), white):
+        np.testing.assert_array_equal(driving(force, DT).samples, force)
+    assert driving(noisy[0.3], DT).floor == pytest.approx(0.005, rel=0.1)
+    assert driving(white, DT).floor == pytest.approx(0.001, rel=0.1)  # nothing in it tells
+    smooth = broad(0.05, 3)
+    found = driving(smooth + 0.005 * np.random.default_rng(4).standard_normal(3000), DT)
+    assert np.std(found.samples - smooth) < 0.003
 
 
 def test_the_result_is_read_only():

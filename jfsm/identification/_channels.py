@@ -131,7 +131,8 @@ def driving(samples: np.ndarray, dt: float) -> Driving:
     floor = noise_floor(samples, dt)
     full = floor.fills_band or floor.silent
     if full or floor.spacing < _OVERSAMPLED:
-        std = _BAND_LIMITED * float(np.std(samples)) if full else floor.std
+        size = float(np.std(samples))
+        std = _BAND_LIMITED * size if full else max(floor.std, LEAST_NOISE * size)
         return Driving(samples, std, std**2, std**2)
     few = tones(samples, floor)
     parameters = floor.effective_parameters if few is None else few.parameters
