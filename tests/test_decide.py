@@ -14,6 +14,7 @@ from jfsm.diagnosis._effect import Effect
 from jfsm.diagnosis._enough import settled, something_left
 from jfsm.diagnosis._gain import Gain
 from jfsm.diagnosis._lack_of_fit import Unfit
+from jfsm.diagnosis._study import shows_later
 from jfsm.diagnosis._trial import Prediction
 from jfsm.identification import Unknown
 
@@ -212,6 +213,12 @@ def leaving(t: Any, *power: float) -> Any:
     """The trial with so much power beyond noise on either part of the record."""
     t.prediction = Prediction(np.array(power) + NOISE, np.full(2, NOISE), np.full(2, NOISE / 10))
     return t
+
+
+@pytest.mark.parametrize(("ahead", "later"), [(0.0, False), (2.0, False), (5.0, True)])
+def test_what_a_trial_leaves_later_is_lacking_unless_another_as_likely_leaves_nothing_there(ahead, later):
+    single, pair = trial(9000.0, 0.0, "stiffness_drop"), trial(9000.0 + ahead, 0.0, "end_stop", "stiffness_drop")
+    assert shows_later([REFITTED, single, leaving(pair, 0.0, 0.02)]) == later
 
 
 @pytest.mark.parametrize(("late", "whiteness", "two"), [(0.0, 0.2, True), (1e-4, 0.2, False), (1e-4, 0.02, True)])

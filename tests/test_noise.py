@@ -10,6 +10,7 @@ from jfsm.diagnosis._clipped import limited
 from jfsm.identification._channels import driving
 from jfsm.records import clipped, noise_floor, spikes
 from jfsm.records._flat_top import flat_top_std
+from jfsm.records._resting import resting_std
 
 DT = 0.02
 
@@ -135,13 +136,32 @@ def test_what_falls_slowly_or_jumps_has_no_flat_end_that_is_noise(kind):
     assert flat_top_std(signal / signal.std() + 1e-4 * rng.standard_normal(3000)) is None
 
 
+@pytest.mark.parametrize("level", [1e-3, 1e-2])
+@pytest.mark.parametrize("held", [3, 5, 12])
+def test_noise_of_a_force_that_is_held_shows_between_its_jumps(held, level):
+    rng = np.random.default_rng(6)
+    force = np.repeat(rng.standard_normal(3000 // held), held) + level * rng.standard_normal(3000)
+    floor = noise_floor(force, DT)
+    assert not floor.fills_band
+    assert floor.std == pytest.approx(level, rel=0.1)
+    assert driving(force, DT).floor == pytest.approx(level, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    "signal", [broad(0.98, 1), np.random.default_rng(2).standard_normal(3000), np.sin(np.arange(3e3))]
+)
+def test_a_signal_that_never_rests_shows_no_noise_between_neighbours(signal):
+    assert resting_std(signal + 1e-3 * np.random.default_rng(7).standard_normal(3000)) is None
+
+
 def test_a_force_that_reaches_beyond_a_spline_runs_as_it_was_measured():
     noisy = {top: broad(top, 3) + 0.005 * np.random.default_rng(4).standard_normal(3000) for top in (0.3, 0.8)}
     white = np.random.default_rng(5).standard_normal(3000)
-    for force in (*noisy.values(), white):
+    jumps = np.repeat(np.random.default_rng(6).standard_normal(600), 5) + 0.01 * white
+    for force in (*noisy.values(), white, jumps):
         np.testing.assert_array_equal(driving(force, DT).samples, force)
     assert driving(noisy[0.3], DT).floor == pytest.approx(0.005, rel=0.1)
-    assert driving(white, DT).floor == pytest.approx(0.001, rel=0.1)  # nothing in it tells
+    assert driving(white, DT).floor == pytest.approx(0.001, rel=0.1)  # nothing in it tells how noisy it is
     smooth = broad(0.05, 3)
     found = driving(smooth + 0.005 * np.random.default_rng(4).standard_normal(3000), DT)
     assert np.std(found.samples - smooth) < 0.003

@@ -38,6 +38,8 @@ from ._trial import Trial
 from ._untold import in_step
 from ._wandering import PLAINLY, SLOWLY, steadied, wandering
 
+_AS_LIKELY = 3.0
+"""Nats by which trials are apart, at most, of which none is likelier than the other."""
 _HEAVIER = 0.03
 """Change of a mass, as a share of it, from which its noise is another."""
 
@@ -98,8 +100,7 @@ class Study:
             found = self._fitted_again(ahead, given, refitted, problem)
             if unless_later and _later(found.refitted, NEGLIGIBLE):
                 return found.refitted
-        best = max(found.every, key=lambda t: t.evidence)
-        if unless_later and _later(best, MUCH):
+        if unless_later and shows_later(found.every):
             return max((t for t in found.every if len(t.effects) < 2), key=lambda t: t.evidence)
         problem, found = self._unless_apart(found, problem)
         return problem, every, found
@@ -251,6 +252,12 @@ def _believed(problem: Problem, near: Trial | None = None) -> tuple[Problem, Tri
         # The noise of the force acts through the mass, and all hypotheses share one noise: that of the likelier mass.
         problem = problem.weighed(near.structure)
     return problem, *fit_model(problem, near=near)
+
+
+def shows_later(trials: Sequence[Trial]) -> bool:
+    """Whether what is lacking shows in what was kept back, beside the best trial and beside all that are as likely."""
+    best = max(t.evidence for t in trials)
+    return all(_later(t, MUCH) for t in trials if t.evidence > best - _AS_LIKELY)
 
 
 def _later(trial: Trial, much: float) -> bool:

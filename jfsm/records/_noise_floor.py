@@ -10,6 +10,7 @@ from scipy.linalg import solveh_banded
 from jfsm.records._core import core_std
 from jfsm.records._flat_top import flat_top_std, spectrum_by_band
 from jfsm.records._quantisation import quantisation_step
+from jfsm.records._resting import resting_std
 
 DEGREE = 5
 SPACINGS = (2, 3, 4, 6, 9, 14, 24, 60, 200)  # samples between knots, tried from fine to coarse
@@ -44,8 +45,8 @@ class NoiseFloor:
         Samples between knots. At the finest, 2, the signal reaches farther up than a spline does, and `smooth` leaves
         part of it.
     fills_band : bool
-        Whether the signal reaches to the band limit as well, so that `std` may contain part of it. `std_error` then
-        reaches down to the quietest tenth of the spectrum.
+        Whether the signal reaches to the band limit as well and never rests, so that `std` may contain part of it.
+        `std_error` then reaches down to the quietest tenth of the spectrum.
     dt : float
         Sampling interval [s].
     std_error : float
@@ -78,7 +79,8 @@ def noise_floor(y: ArrayLike, dt: float) -> NoiseFloor:
     Quintic splines with uniform knots are fitted by least squares; generalised cross-validation chooses the spacing of
     the knots. The residual gives the noise, unless the core of the residual or of the sixth difference is clearly
     narrower: the jumps that dry friction leaves in an acceleration widen the residual, at a few samples only. Where a
-    signal reaches farther up than a spline does, the noise is the flat end of the spectrum, if it has one.
+    signal reaches farther up than a spline does, the noise is the flat end of the spectrum, if it has one, or what is
+    left where the signal rests.
 
     Parameters
     ----------
@@ -127,12 +129,11 @@ def noise_floor(y: ArrayLike, dt: float) -> NoiseFloor:
     if narrowest < INFLATED * std:
         std = narrowest
     apart = min(max(middle, std) - narrowest, FARTHEST * std)
-    flat = flat_top_std(y) if spacing == SPACINGS[0] else None
-    if flat is not None:
-        std, variance, apart = flat, flat**2, 0.0
+    fills_band = spacing == SPACINGS[0]
+    if fills_band and (alone := _noise_alone(y)) is not None:
+        std, variance, apart, fills_band = alone, alone**2, 0.0, False
     total = float(np.var(y, ddof=1))
     explained = max(0.0, 1.0 - variance / total) if total > 0 else 0.0
-    fills_band = spacing == SPACINGS[0] and flat is None
     if fills_band or explained < SILENCE:  # what is left may be signal
         apart = max(apart, std - _quietest_std(y))
     smooth.flags.writeable = False
@@ -151,7 +152,8 @@ def noise_floor(y: ArrayLike, dt: float) -> NoiseFloor:
 def _best_spline(y: NDArray[np.float64]) -> tuple[int, int, NDArray[np.float64]]:
     """Spacing, number of coefficients and values of the spline with the smallest cross-validation score.
 
-    The score takes what is left for white; where that is much, and is not, the finest spline leaves least of a signal.
+    The score takes what is left for white; where that is much, and is not, or far more than noise between jumps, the
+    finest spline leaves least of a signal.
     """
     n = y.size
     splines = []
@@ -165,10 +167,17 @@ def _best_spline(y: NDArray[np.float64]) -> tuple[int, int, NDArray[np.float64]]
         score = float(residual @ residual) / (n - parameters) ** 2
         splines.append((score, spacing, parameters, smooth))
     best = min(splines)
-    left = float(np.var(y - best[-1]))
-    if left > MOST_LEFT * np.var(y) and _quietest_std(y) ** 2 < UNEVEN * left:
-        best = splines[0]
-    return best[1:]
+    residual, rest = y - best[-1], resting_std(y)
+    left = float(np.var(residual))
+    much = left > MOST_LEFT * np.var(y) and _quietest_std(y) ** 2 < UNEVEN * left
+    jumps = rest is not None and rest < UNEVEN * core_std(residual)
+    return (splines[0] if much or jumps else best)[1:]
+
+
+def _noise_alone(y: NDArray[np.float64]) -> float | None:
+    """Standard deviation of the noise where the signal is not; None if it is everywhere."""
+    flat = flat_top_std(y)
+    return resting_std(y) if flat is None else flat
 
 
 def _quietest_std(y: NDArray[np.float64]) -> float:
