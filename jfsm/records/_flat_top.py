@@ -23,10 +23,10 @@ _TAPS, _EDGE = 61, 0.12
 
 
 def spectrum_by_band(y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Power (10,) of a channel (n,) in equal bands up to the band limit; of white noise, its variance in each."""
+    """Power of a channel (n,) in ten equal bands up to the band limit; of white noise, its variance in each."""
     taper = np.hanning(y.size)
     power = np.abs(np.fft.rfft(taper * (y - y.mean()))) ** 2 / (taper @ taper)
-    return np.array([band.mean() for band in np.array_split(power, BANDS)])
+    return np.array([band.mean() for band in np.array_split(power, min(BANDS, power.size))])
 
 
 def flat_top_std(y: NDArray[np.float64]) -> float | None:
@@ -35,10 +35,10 @@ def flat_top_std(y: NDArray[np.float64]) -> float | None:
     None unless two bands or more at the top hold the same, a signal ends steeply below them, and what they hold is the
     same all along: jumps and kinks have flat ends as well.
     """
-    if y.size < 2 * BANDS * _BESIDE * _FEWEST:
+    lines = y.size / (2 * BANDS * _BESIDE)
+    if lines < _FEWEST:
         return None
-    band = spectrum_by_band(y)
-    apart = _SIGNIFICANT / np.sqrt(y.size / (2 * BANDS * _BESIDE))
+    band, apart = spectrum_by_band(y), _SIGNIFICANT / np.sqrt(lines)
     for begin in range(1, BANDS - 1):
         level = band[begin:].mean()
         if np.all(np.abs(band[begin:] - level) < apart * level):
