@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import jfsm
 from jfsm.diagnosis import _search
-from jfsm.diagnosis._akin import instead_of, late_instead, special_cases
+from jfsm.diagnosis._akin import beside_a_spring, instead_of, late_instead, special_cases
 from jfsm.diagnosis._begin import Begin, Start, begun
 from jfsm.diagnosis._candidates import (
     Candidate,
@@ -35,7 +35,7 @@ from jfsm.diagnosis._search import (
     search_pairs,
 )
 from jfsm.identification import prepare
-from jfsm.structures import Coulomb, SineStiffness, SmoothCoulomb, Stribeck, causes
+from jfsm.structures import Coulomb, DeadZone, EndStop, SineStiffness, SmoothCoulomb, Stribeck, causes
 
 MODEL = jfsm.Structure.sdof(1.0, 9.0, 0.3)
 
@@ -48,6 +48,18 @@ def test_a_special_case_begins_from_the_numbers_of_the_law_that_holds_it():
     assert case.effects == coulomb.effects
     assert case.starts[0].values() == MODEL.values() | {"coulomb@0-1.F": 2.0}
     assert case.begin is begin
+
+
+@pytest.mark.parametrize(("found", "other"), [(EndStop, DeadZone), (DeadZone, EndStop)])
+def test_play_in_a_spring_is_followed_from_a_stop_beside_a_softer_one_and_the_other_way(found, other):
+    model, known = jfsm.Structure.sdof(2.0, 8.0, 0.1), jfsm.causes()
+    among = [Candidate((Effect(known[name], (0, 1)),), (model,)) for name in ("end_stop", "dead_zone", "coulomb")]
+    begin: Begin = {("stiffness@0-1.k", None): Start(5.0, 8.0), ("mass@1", None): Start(2.1, 2.0)}
+    (case,) = beside_a_spring(found(3.0, 0.2, at=(0, 1)), begin, among, model)
+    assert case.effects[0].cause.effect is other
+    assert isinstance(case.starts[0].terms[-1], other) and case.starts[0].terms[-1].values == (3.0, 0.2)
+    assert case.begin == {("mass@1", None): Start(2.1, 2.0)}
+    assert beside_a_spring(Coulomb(1.0, at=(0, 1)), begin, among, model) == []
 
 
 def test_an_early_channel_is_a_late_other_one():

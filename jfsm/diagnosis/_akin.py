@@ -4,7 +4,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from ..identification import Nuisances, with_a_rest
-from ..structures import AbstractSensor, AbstractTerm, ChannelDelay, ForceDelay, QuadraticStiffness, Structure
+from ..structures import (
+    AbstractSensor,
+    AbstractTerm,
+    ChannelDelay,
+    DeadZone,
+    EndStop,
+    ForceDelay,
+    QuadraticStiffness,
+    Structure,
+)
 from ._adequacy import SIGNIFICANT, adequate
 from ._begin import Begin, found_in, own_part
 from ._candidates import SHAPES, Candidate, Laws, at_rest, contained, may_rest_anywhere
@@ -12,6 +21,9 @@ from ._effect import Effect
 from ._problem import Problem
 from ._score import promised
 from ._trial import Trial
+
+_BESIDE_A_SPRING: Mapping[type[AbstractTerm], type[AbstractTerm]] = {EndStop: DeadZone, DeadZone: EndStop}
+"""Laws that are another one with the same numbers beside a spring: play in a spring is a stop beside a softer one."""
 
 
 def special_cases(law: AbstractTerm, begin: Begin, among: Sequence[Candidate]) -> list[Candidate]:
@@ -24,6 +36,16 @@ def special_cases(law: AbstractTerm, begin: Begin, among: Sequence[Candidate]) -
         start = start.without(placed) + type(placed)(**special, at=placed.at)
         cases.append(replace(c, starts=(start,), begin=begin))
     return cases
+
+
+def beside_a_spring(law: AbstractTerm, begin: Begin, among: Sequence[Candidate], model: Structure) -> list[Candidate]:
+    """What a law that was found is if the stiffness is as the model states, and not as it was found beside the law."""
+    other = _BESIDE_A_SPRING.get(type(law))
+    own = {key: start for key, start in own_part(begin).items() if not key[0].startswith("stiffness@")}
+    alone = [
+        c for c in among if len(c.effects) == 1 and (c.effects[0].at, c.effects[0].cause.effect) == (law.at, other)
+    ]
+    return [replace(c, starts=(model + other(*law.values, at=law.at),), begin=own) for c in alone if other is not None]
 
 
 def instead_of(

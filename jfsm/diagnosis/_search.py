@@ -11,7 +11,7 @@ from .._threads import compiled_once, side_by_side
 from ..identification import LADDER, LANES, Maximum, Posterior, approach, finish, lanes_of, rungs, with_offsets
 from ..structures import AbstractSensor, AbstractTerm, AccelerationGain, ForceGain, Structure
 from ._adequacy import GATE, SIGNIFICANT, adequate, explained
-from ._akin import instead_of, late_instead, resting, special_cases
+from ._akin import beside_a_spring, instead_of, late_instead, resting, special_cases
 from ._begin import Begin, found_in, own_part
 from ._candidates import Candidate
 from ._effect import Effect, families
@@ -228,6 +228,7 @@ def search_akin(
         begin = found_in(t)
         for law in t.laws:
             tried += special_cases(law, begin, every)
+            tried += beside_a_spring(law, begin, every, problem.model)
             tried += resting(t.structure, law, begin, every, problem.model, problem.first)
         for part in t.parts:
             tried += late_instead(part, begin, effects, problem.model)
