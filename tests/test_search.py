@@ -54,11 +54,12 @@ def test_a_special_case_begins_from_the_numbers_of_the_law_that_holds_it():
 def test_play_in_a_spring_is_followed_from_a_stop_beside_a_softer_one_and_the_other_way(found, other):
     model, known = jfsm.Structure.sdof(2.0, 8.0, 0.1), jfsm.causes()
     among = [Candidate((Effect(known[name], (0, 1)),), (model,)) for name in ("end_stop", "dead_zone", "coulomb")]
-    begin: Begin = {("stiffness@0-1.k", None): Start(5.0, 8.0), ("mass@1", None): Start(2.1, 2.0)}
+    kept: Begin = {("mass@1", None): Start(2.1, 2.0), ("stiffness@1-2.k", None): Start(4.0, 3.0)}
+    begin: Begin = {("stiffness@0-1.k", None): Start(5.0, 8.0), **kept}
     (case,) = beside_a_spring(found(3.0, 0.2, at=(0, 1)), begin, among, model)
     assert case.effects[0].cause.effect is other
     assert isinstance(case.starts[0].terms[-1], other) and case.starts[0].terms[-1].values == (3.0, 0.2)
-    assert case.begin == {("mass@1", None): Start(2.1, 2.0)}
+    assert case.begin == kept
     assert beside_a_spring(Coulomb(1.0, at=(0, 1)), begin, among, model) == []
 
 

@@ -41,11 +41,17 @@ def special_cases(law: AbstractTerm, begin: Begin, among: Sequence[Candidate]) -
 def beside_a_spring(law: AbstractTerm, begin: Begin, among: Sequence[Candidate], model: Structure) -> list[Candidate]:
     """What a law that was found is if the stiffness is as the model states, and not as it was found beside the law."""
     other = _BESIDE_A_SPRING.get(type(law))
-    own = {key: start for key, start in own_part(begin).items() if not key[0].startswith("stiffness@")}
-    alone = [
-        c for c in among if len(c.effects) == 1 and (c.effects[0].at, c.effects[0].cause.effect) == (law.at, other)
+    if other is None:
+        return []
+    softened = f"stiffness@{law.at[0]}-{law.at[1]}."
+    own = {key: start for key, start in own_part(begin).items() if not key[0].startswith(softened)}
+    starts = (model + other(*law.values, at=law.at),)
+    alone = [c for c in among if len(c.effects) == 1]
+    return [
+        replace(c, starts=starts, begin=own)
+        for c in alone
+        if (c.effects[0].at, c.effects[0].cause.effect) == (law.at, other)
     ]
-    return [replace(c, starts=(model + other(*law.values, at=law.at),), begin=own) for c in alone if other is not None]
 
 
 def instead_of(
