@@ -16,7 +16,7 @@ from ..structures import (
 )
 from ._adequacy import SIGNIFICANT, adequate
 from ._begin import Begin, found_in, own_part
-from ._candidates import SHAPES, Candidate, Laws, at_rest, contained, may_rest_anywhere
+from ._candidates import SHAPES, Candidate, Laws, alone_there, at_rest, contained, may_rest_anywhere
 from ._effect import Effect
 from ._problem import Problem
 from ._score import promised
@@ -46,12 +46,7 @@ def beside_a_spring(law: AbstractTerm, begin: Begin, among: Sequence[Candidate],
     softened = f"stiffness@{law.at[0]}-{law.at[1]}."
     own = {key: start for key, start in own_part(begin).items() if not key[0].startswith(softened)}
     starts = (model + other(*law.values, at=law.at),)
-    alone = [c for c in among if len(c.effects) == 1]
-    return [
-        replace(c, starts=starts, begin=own)
-        for c in alone
-        if (c.effects[0].at, c.effects[0].cause.effect) == (law.at, other)
-    ]
+    return [replace(c, starts=starts, begin=own) for c in alone_there({(law.at, other)}, among)]
 
 
 def instead_of(

@@ -1,7 +1,7 @@
 """Hypotheses to be tried: every cause at every place where it could sit, with its starts."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import chain, product, zip_longest
@@ -174,8 +174,13 @@ def promising(tried: Sequence[Candidate]) -> tuple[list[Candidate], list[Candida
 def contained(laws: Sequence[AbstractTerm], among: Sequence[Candidate]) -> list[Candidate]:
     """Candidates that can begin and whose law is what one of `laws` is for certain of its numbers, at its place."""
     found = {(law.at, kind) for law in laws for kind in law.contains}
-    alone = [c for c in among if c.starts and len(c.effects) == 1]
-    return [c for c in alone if (c.effects[0].at, c.effects[0].cause.effect) in found]
+    return [c for c in alone_there(found, among) if c.starts]
+
+
+def alone_there(laws: Collection[tuple[tuple, type]], among: Sequence[Candidate]) -> list[Candidate]:
+    """Candidates of a single effect that is one of these laws, each at its place."""
+    alone = [c for c in among if len(c.effects) == 1]
+    return [c for c in alone if (c.effects[0].at, c.effects[0].cause.effect) in laws]
 
 
 def as_promising(effects: tuple[Effect, ...], tried: Sequence[Candidate], left: Sequence[Candidate]) -> list[Candidate]:
