@@ -215,10 +215,10 @@ def _powers(posterior: Posterior, theta: np.ndarray, gone: np.ndarray, slack: fl
     left, moved = [], []
     for index, nuisances in enumerate(posterior.records):
         use, scored = windows(nuisances)
-        there, error = (
-            posterior.innovations(values, index, use=use, noise_scales=False, slack=slack).error
-            for values in (theta, gone)
-        )
+        both = np.stack([theta, gone])
+        there, error = posterior.many_innovations(
+            both, index, use=use, noise_scales=False, slack=np.full(2, slack)
+        ).error
         alive = np.asarray(nuisances.readings.use)[: nuisances.samples] > 0
         for chosen in sets(nuisances, posterior.until[index]):
             mask = (scored & chosen)[:, None] & alive

@@ -56,7 +56,7 @@ def seems_late(beside: Trial, problem: Problem) -> ChannelDelay | None:
 
 
 def _cost(t: Trial, problem: Problem) -> float:
-    return float(problem.posterior_of(t).evaluate(t.theta[None])[0][0])
+    return problem.posterior_of(t).value(t.theta)
 
 
 def _read_later(problem: Problem, c: int, samples: float) -> Problem:

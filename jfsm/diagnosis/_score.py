@@ -4,12 +4,10 @@ C. R. Rao, Proc. Camb. Phil. Soc. 44 (1948) 50-57. The force is added to what dr
 regressed on what it does to them beside what the trial's own unknowns do.
 """
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from jax import Array
 
 from .._threads import side_by_side
 from ..identification import Placed, Posterior
@@ -22,6 +20,8 @@ _SMALL = 1e-4
 """Size of the force that is added, as a share of the elastic force."""
 _NUDGE = 1e-2
 """Change of an unknown that shows what it does, in its standard errors."""
+_TOGETHER = 16
+"""Runs that are asked for at once."""
 _APART = 1e-6
 """Singular values, as shares of the largest, below which shapes are no longer told apart."""
 
@@ -46,7 +46,7 @@ def moved(trial: Trial, posterior: Posterior, index: int, forces: np.ndarray) ->
     nuisances, theta = posterior.records[index], trial.theta
     slack = nuisances.forgiven
     base = posterior.innovations(theta, index, slack=slack)
-    error, deviation = np.asarray(base.error), np.sqrt(np.maximum(base.variance, 1e-300))
+    error, deviation = base.error, np.sqrt(np.maximum(base.variance, 1e-300))
     counted = np.asarray(nuisances.readings.use)[: len(error)] > 0
     counted[0], counted[posterior.until[index] :] = False, False  # the start is an unknown
 
@@ -54,22 +54,25 @@ def moved(trial: Trial, posterior: Posterior, index: int, forces: np.ndarray) ->
         inside = readings[counted] / deviation[counted]
         return inside if np.all(np.isfinite(inside)) else np.zeros_like(inside)  # a motion that runs away tells nothing
 
-    def change_of(then: Array, change: float) -> np.ndarray:
-        return ours(np.asarray(then) - error) / change
+    mine = [not u.path.startswith("noise@") and u.record in (None, index) for u in trial.unknowns]
+    change = np.where(mine, _NUDGE * np.maximum(np.sqrt(np.maximum(np.diag(trial.covariance), 0.0)), 1e-9), 0.0)
+    picked = np.flatnonzero(mine)
+    push = -_SMALL * nuisances.elastic_force(trial.structure) * forces
+    push = np.concatenate([np.zeros((len(picked), *push.shape[1:])), push])
+    values = theta + np.concatenate([np.diag(change)[picked], np.zeros((len(forces), theta.size))])
+    lots = [slice(k, k + _TOGETHER) for k in range(0, len(values), _TOGETHER)]
 
-    def by_unknown(k: int) -> np.ndarray:
-        if trial.unknowns[k].path.startswith("noise@") or trial.unknowns[k].record not in (None, index):
-            return np.zeros(np.count_nonzero(counted))
-        change = _NUDGE * max(math.sqrt(max(trial.covariance[k, k], 0.0)), 1e-9)
-        nudged = theta + change * (np.arange(theta.size) == k)
-        return change_of(posterior.innovations(nudged, index, slack=slack).error, change)
+    def run(lot: slice) -> np.ndarray:
+        loose = np.full(len(values[lot]), slack)
+        return posterior.many_innovations(values[lot], index, push=push[lot], slack=loose).error - error
 
-    def by_force(force: np.ndarray) -> np.ndarray:
-        push = -_SMALL * nuisances.elastic_force(trial.structure) * force
-        return change_of(posterior.innovations(theta, index, push=push, slack=slack).error, _SMALL)
-
-    unknowns, pushed = side_by_side(by_unknown, range(theta.size)), side_by_side(by_force, forces)
-    return Moved(ours(error), np.stack(list(unknowns), 1), np.stack(list(pushed), 1))
+    changes = np.concatenate(list(side_by_side(run, lots)))
+    changes /= np.concatenate([change[picked], np.full(len(forces), _SMALL)])[:, None, None]
+    by_unknown = np.zeros((np.count_nonzero(counted), theta.size))
+    for k, moved_by in zip(picked, changes, strict=False):
+        by_unknown[:, k] = ours(moved_by)
+    by_force = np.stack([ours(moved_by) for moved_by in changes[len(picked) :]], 1)
+    return Moved(ours(error), by_unknown, by_force)
 
 
 def regressed(columns: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, int]:

@@ -188,28 +188,32 @@ def predict(posterior: Posterior, theta: np.ndarray, slight: bool = False) -> Pr
         mine = [is_offset(u.path, "force", "acceleration") for u in posterior.hypothesis.unknowns[0]]
         theta = np.where(mine, np.clip(theta, -_SLIGHT, _SLIGHT), theta)
     best: list[tuple[float, Prediction]] = []
-    for slack in SLACKS:
+    loosely, every = np.array(SLACKS), np.repeat(theta[None], len(SLACKS), 0)
+    seen = [
+        posterior.many_innovations(every, index, use=windows(nuisances)[0], noise_scales=False, slack=loosely)
+        for index, nuisances in enumerate(posterior.records)
+    ]
+    for k in range(len(SLACKS)):
         errors, expected, scatter = [], [], []
         for index, nuisances in enumerate(posterior.records):
-            use, scored = windows(nuisances)
+            scored = windows(nuisances)[1]
             size, alone = extent(nuisances), _alone(nuisances)
-            found = posterior.innovations(theta, index, use=use, noise_scales=False, slack=slack)
-            truth = found if slack == 0 else posterior.innovations(theta, index, use=use, noise_scales=False)
+            error, variance = seen[index].error[k], seen[index].variance[0]  # held tightly, its error bar is true
             alive = np.asarray(nuisances.readings.use)[: nuisances.samples] > 0
             for chosen in sets(nuisances, posterior.until[index]):
                 mask = (scored & chosen)[:, None] & alive
                 count = np.maximum(mask.sum(0), 1)
-                share = np.clip(found.error / size, -_RUN_AWAY, _RUN_AWAY)
+                share = np.clip(error / size, -_RUN_AWAY, _RUN_AWAY)
                 errors.append(np.sum(np.sum(np.where(mask, share**2, 0.0), 0) / count))
-                doubt = np.clip(truth.variance / size**2, 0.0, _RUN_AWAY**2)
+                doubt = np.clip(variance / size**2, 0.0, _RUN_AWAY**2)
                 noise = np.sum(np.where(mask, doubt, 0.0), 0) / count
                 white = np.minimum(np.asarray(nuisances.readings.variance) / size**2, noise)
                 # Readings err each by itself, a state that was filtered for a whole window: in two directions.
                 pieces = np.maximum(count * nuisances.record.dt / (nuisances.period * PREDICTED), 1.0)
                 expected.append(np.sum(noise))
                 scatter.append(np.sqrt(np.sum(2 * white**2 / (count * alone) + (noise - white) ** 2 / pieces)))
-        error = np.nan_to_num(np.array(errors), nan=np.inf)
-        best.append((float(np.sum(error)), Prediction(error, np.array(expected), np.array(scatter))))
+        total = np.nan_to_num(np.array(errors), nan=np.inf)
+        best.append((float(np.sum(total)), Prediction(total, np.array(expected), np.array(scatter))))
     return min(best, key=lambda item: item[0])[1]
 
 

@@ -196,6 +196,4 @@ def excitation(
         intervals[: n - 1] = reconstruct(both, factor, method)[take]
         intervals[n - 1 :] = both[-1]  # leads to no sample
     time = record.time[0] + record.dt * np.arange(padded)
-    return Fine(
-        jnp.asarray(intervals[..., :dof]), jnp.asarray(intervals[..., dof]), jnp.asarray(time), jnp.asarray(record.dt)
-    )
+    return Fine(intervals[..., :dof], intervals[..., dof], time, np.asarray(record.dt))

@@ -111,17 +111,22 @@ def remember(past: Past, x: Float[Array, " dof"], v: Float[Array, " dof"], keep:
 
 
 def delayed_force(plant: Plant, minv, motion: Motion, past: Past, g, time, step) -> Float[Array, "halves dof"]:
-    """Forces that answer the past, on the half steps of a sample; `g` (halves, dof) is what drives it.
+    """Forces that answer the past, on the half steps of a sample; `g` (halves, dof) is what drives it."""
+    a = acceleration(plant, minv, motion.x, motion.v, motion.z, motion.mode, g[0], time)[0]
+    return answers(plant, motion, past, a, jnp.linspace(0.0, 1.0, g.shape[0]), time, step)
+
+
+def answers(
+    plant: Plant, motion: Motion, past: Past, a, ahead: Float[Array, " nodes"], time, step
+) -> Float[Array, "nodes dof"]:
+    """Forces that answer the past, at some shares `ahead` of a sample that begins with a motion and acceleration `a`.
 
     The past is read by cubic Hermite interpolation between samples. What lies inside the present sample (a delay
     shorter than it) is read off the parabola that the motion begins it with.
     """
-    halves, reach = g.shape[0], past.x.shape[0]
-    a = acceleration(plant, minv, motion.x, motion.v, motion.z, motion.mode, g[0], time)[0]
-    ahead = jnp.linspace(0.0, 1.0, halves)
-    slots, total = plant.delayed, jnp.zeros(g.shape)
+    reach, slots, total = past.x.shape[0], plant.delayed, jnp.zeros((ahead.size, plant.dof))
 
-    def before(k: Int[Array, " halves"], now, ring) -> Float[Array, "halves dof"]:
+    def before(k: Int[Array, " nodes"], now, ring) -> Float[Array, "nodes dof"]:
         """Values so many samples ago."""
         return jnp.where((k == 0)[:, None], now[None, :], ring[(past.count - k) % reach])
 

@@ -6,8 +6,8 @@ from functools import wraps
 from threading import Lock
 from typing import Any, TypeVar
 
-import equinox as eqx
 import jax
+import jax.numpy as jnp
 from jax.experimental.xla_metadata import set_xla_metadata
 
 Found = TypeVar("Found")
@@ -23,64 +23,72 @@ _refused = False
 
 
 def jit_with_kernels(function: Callable[..., Found]) -> Callable[..., Found]:
-    """`eqx.filter_jit` of a function whose keyword `one_kernel` says whether its loops may be kernels.
+    """`jax.jit` of a function whose keyword `one_kernel` says whether its loops may be kernels.
 
-    Programs that have not been used for long are dropped. Which operations a kernel may hold differs between versions
-    of XLA: after a first refusal there are no more kernels.
+    The first argument is hashable and part of the program, the others are trees of arrays. Programs that have not been
+    used for long are dropped. Which operations a kernel may hold differs between versions of XLA: after a first refusal
+    there are no more kernels.
     """
     programs: OrderedDict[Hashable, Callable[..., Found]] = OrderedDict()
     lock = Lock()
 
-    def compiled(arguments: tuple, *, one_kernel: bool) -> Found:
-        dynamic, static = eqx.partition(arguments, eqx.is_array)
-        fixed, shape_of = jax.tree.flatten(static)
-        kinds = tuple((leaf.shape, leaf.dtype) for leaf in jax.tree.leaves(dynamic))
-        key = shape_of, tuple(fixed), kinds, one_kernel
+    def compiled(static: Hashable, *arguments: Any, one_kernel: bool) -> Found:
+        key = static, one_kernel
         with lock:
             program = programs.pop(key, None) or _program(function, static, one_kernel)
             programs[key] = program
             while len(programs) > _KEPT:
                 programs.popitem(last=False)
-        return program(dynamic)
+        return program(*arguments)
 
     @wraps(function)
-    def run(*arguments: Any) -> Found:
+    def run(static: Hashable, *arguments: Any) -> Found:
         global _refused
         if not _refused:
             try:
-                return compiled(arguments, one_kernel=True)
+                return compiled(static, *arguments, one_kernel=True)
             except jax.errors.JaxRuntimeError:
-                found = compiled(arguments, one_kernel=False)  # raises again what is no refusal
+                found = compiled(static, *arguments, one_kernel=False)  # raises again what is no refusal
                 _refused = True
                 return found
-        return compiled(arguments, one_kernel=False)
+        return compiled(static, *arguments, one_kernel=False)
 
     return run
 
 
-def _program(function: Callable[..., Found], static: Any, one_kernel: bool) -> Callable[..., Found]:
-    """The function of what is not `static` among its arguments, compiled at its first call."""
+def _program(function: Callable[..., Found], static: Hashable, one_kernel: bool) -> Callable[..., Found]:
+    """The function with its first argument, compiled at its first call."""
 
     @wraps(function)
-    def program(dynamic):
-        return function(*eqx.combine(dynamic, static), one_kernel=one_kernel)
+    def program(*arguments):
+        return function(static, *arguments, one_kernel=one_kernel)
 
     return jax.jit(program, compiler_options=_OPTIONS if jax.default_backend() == "cpu" else None)
 
 
-def one_kernel_scan(body: Callable[[Any, Any], tuple[Any, Any]], start: Any, inputs: Any) -> tuple[Any, Any]:
-    """`jax.lax.scan` for a body of very many operations on a few numbers each.
+def as_one_kernel(loop: Callable[..., Found]) -> Callable[..., Found]:
+    """A function that is a loop of very many operations on a few numbers each.
 
     Most of the time of such a loop goes by between its operations. On a processor it is compiled to one kernel here:
     three times faster, and on one core. A kernel calls no library, so that matrices must be small, too small for XLA to
     have them multiplied by one, and nothing may be decomposed.
     """
 
-    def loop(start, inputs):
-        return jax.lax.scan(body, start, inputs)
+    def called(*arguments: Any) -> Found:
+        leaves, tree = jax.tree.flatten(arguments)
+        full = [leaf for leaf in leaves if leaf.size]  # an empty array has no place in a kernel
+        shape = jax.eval_shape(loop, *arguments)
 
-    if jax.default_backend() != "cpu":
-        return loop(start, inputs)
-    # The attributes belong to the call, not to what is inside: a tagged result tags the operation that it comes from.
-    found: Any = set_xla_metadata(jax.jit(loop)(start, inputs), inlineable="false", xla_cpu_small_call="true")
-    return found
+        def on_full(full: list[Any]) -> list[Any]:
+            rest = iter(full)
+            every = [next(rest) if leaf.size else jnp.zeros(leaf.shape, leaf.dtype) for leaf in leaves]
+            return [leaf for leaf in jax.tree.leaves(loop(*jax.tree.unflatten(tree, every))) if leaf.size]
+
+        # The attributes belong to the call, not to what is inside: a tagged result tags the operation that it comes
+        # from.
+        tagged: Any = set_xla_metadata(jax.jit(on_full)(full), inlineable="false", xla_cpu_small_call="true")
+        rest = iter(tagged)
+        outcome = [next(rest) if leaf.size else jnp.zeros(leaf.shape, leaf.dtype) for leaf in jax.tree.leaves(shape)]
+        return jax.tree.unflatten(jax.tree.structure(shape), outcome)
+
+    return called if jax.default_backend() == "cpu" else loop

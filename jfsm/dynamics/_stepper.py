@@ -195,14 +195,24 @@ def _in_mode(plant: Plant, minv, x, v, z, mode, load: Load, start, share):
 
 def advance(plant: Plant, minv, motion: Motion, load: Load) -> Motion:
     """Motion at the end of one step."""
-    end = Motion(*_in_mode(plant, minv, *motion, load, jnp.zeros(()), jnp.ones(())), motion.mode)
+    end = in_mode(plant, minv, motion, load)
     if not len(plant.friction):
         return end
-    ended = acceleration(plant, minv, *end, load.force[2], load.time + load.step)[1] < 0
-    return jax.lax.cond(jnp.any(ended), lambda: _segments(plant, minv, motion, end, load), lambda: end)
+    over = any_ended(plant, minv, end, load)
+    return jax.lax.cond(over, lambda: through_events(plant, minv, motion, end, load), lambda: end)
 
 
-def _segments(plant: Plant, minv, motion: Motion, end: Motion, load: Load) -> Motion:
+def in_mode(plant: Plant, minv, motion: Motion, load: Load) -> Motion:
+    """Motion at the end of one step, had no mode ended in it."""
+    return Motion(*_in_mode(plant, minv, *motion, load, jnp.zeros(()), jnp.ones(())), motion.mode)
+
+
+def any_ended(plant: Plant, minv, end: Motion, load: Load) -> Array:
+    """Whether any mode has ended before the `end` of a step."""
+    return jnp.any(acceleration(plant, minv, *end, load.force[2], load.time + load.step)[1] < 0)
+
+
+def through_events(plant: Plant, minv, motion: Motion, end: Motion, load: Load) -> Motion:
     """Motion at the end of a step in which modes end; `end` is where the first of them would lead."""
     rows, one = plant.friction.direction, jnp.ones(())
 

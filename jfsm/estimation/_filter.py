@@ -17,36 +17,31 @@ G. Wahba, J. R. Statist. Soc. B 40 (1978) 364, of the spline. A. E. Bryson, D. E
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..dynamics._forces import carried, friction_limits, settle
-from ..dynamics._grid import (
-    Fine,
-    Past,
-    advance_sample,
-    begin,
-    drive_before,
-    load_of,
-    punctual,
-    remember,
-    true_force,
-)
-from ..dynamics._kernel import one_kernel_scan
+from ..dynamics._grid import Fine, Past, advance_sample, begin, drive_before, load_of, punctual, remember, true_force
+from ..dynamics._kernel import as_one_kernel
 from ..dynamics._plant import Plant, Readout
 from ..dynamics._stepper import (
     Load,
     Motion,
     acceleration,
+    any_ended,
     holding_force,
+    in_mode,
     inverse_mass,
     linearised,
     mode_at,
     stopping,
+    through_events,
     with_friction,
 )
 
@@ -78,16 +73,15 @@ class Readings(eqx.Module):
     use: Float[Array, "n channels"]
     variance: Float[Array, " channels"]
     valid: Float[Array, " n"]
-    wander: Float[Array, "wandering 2"] = eqx.field(default_factory=lambda: jnp.zeros((0, 2)))
+    wander: Float[Array, "wandering 2"] = eqx.field(default_factory=lambda: np.zeros((0, 2)))
     wandering: tuple[int, ...] = eqx.field(default=(), static=True)
-    colour: Float[Array, "coloured 2"] = eqx.field(default_factory=lambda: jnp.zeros((0, 2)))
+    colour: Float[Array, "coloured 2"] = eqx.field(default_factory=lambda: np.zeros((0, 2)))
     coloured: tuple[int, ...] = eqx.field(default=(), static=True)
 
     @property
     def zeros(self) -> tuple[int | None, ...]:
-        """The channel that every state of the channels adds to: a zero that wanders and its slope, which adds to none,
-        then what noise remembers."""
-        return (*(c for zero in self.wandering for c in (zero, None)), *self.coloured)
+        """`zeros_of` these."""
+        return zeros_of(self)
 
 
 class ProcessNoise(eqx.Module):
@@ -150,54 +144,194 @@ class State(NamedTuple):
         return Motion(self.x, self.v, self.z, self.mode.astype(self.x.dtype))
 
 
+class Assumed(eqx.Module):
+    """What a lane takes for granted about noise.
+
+    `variance` (channels,) is that of each channel, `wander` and `colour` are as in `Readings`, of the channels that
+    `wandering` and `coloured` count; `velocity` (dof, dof) is as in `ProcessNoise`, `start` the covariance of
+    the motion and hidden states at the first sample.
+    """
+
+    variance: Float[Array, " channels"]
+    wander: Float[Array, "wandering 2"]
+    colour: Float[Array, "coloured 2"]
+    velocity: Float[Array, "dof dof"]
+    start: Float[Array, "state state"]
+    wandering: tuple[int, ...] = eqx.field(static=True)
+    coloured: tuple[int, ...] = eqx.field(static=True)
+
+    def begin(self) -> Float[Array, "state state"]:
+        """Covariance of all states at the first sample."""
+        remembered = self.colour[:, 1] * self.variance[jnp.array(self.coloured, dtype=int)]
+        zeros = _beside(_about_slopes(self.wander[:, 0]), jnp.diag(remembered))
+        return _beside(self.start, zeros)
+
+
+def zeros_of(noise: Readings | Assumed) -> tuple[int | None, ...]:
+    """The channel that every state of the channels adds to: a zero that wanders and its slope, which adds to none, then
+    what noise remembers."""
+    return (*(c for zero in noise.wandering for c in (zero, None)), *noise.coloured)
+
+
+class Stretch(NamedTuple):
+    """Inputs of some samples: what drives the lanes, and what was read.
+
+    `force` (n, halves, lanes, dof) and `base` (n, halves) are on the half steps of each sample; `before`
+    (n, lanes, late, 5, dof + 1) is what drove earlier, for every channel that is late, the base last.
+    """
+
+    force: Float[Array, "n halves lanes dof"]
+    base: Float[Array, "n halves"]
+    before: Float[Array, "n lanes late 5 columns"]
+    time: Float[Array, " n"]
+    values: Float[Array, "n channels"]
+    use: Float[Array, "n channels"]
+
+
+class Lanes(NamedTuple):
+    """Plants side by side; whole numbers are those of all of them."""
+
+    floats: Plant
+    fixed: Plant
+
+    def __call__(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """What a function makes of the plant and the arguments of every lane."""
+        return jax.vmap(lambda floats, *mine: function(eqx.combine(floats, self.fixed), *mine))(self.floats, *arguments)
+
+    def first(self) -> Plant:
+        """The plant of the first lane."""
+        return eqx.combine(jax.tree.map(lambda leaf: leaf[0], self.floats), self.fixed)
+
+
+def on_lanes(plants: Plant) -> Lanes:
+    """Lanes of plants that have a leading axis on every leaf that is no whole number."""
+    return Lanes(*eqx.partition(plants, eqx.is_inexact_array))
+
+
 class Known(NamedTuple):
-    """What a run of the filter knows throughout besides the plant: its inverse mass, the channels' white noise
-    variances, what a sample makes of their zeros, and the covariance that it adds to these."""
+    """What a lane knows throughout besides its plant: the inverse mass, the channels' white noise variances, what a
+    sample makes of their zeros, the covariances that it adds to these and to the motion, and speeds that are none."""
 
     minv: Float[Array, "dof dof"]
     variances: Float[Array, " channels"]
     onward: Float[Array, "zeros zeros"]
     stirred: Float[Array, "zeros zeros"]
+    added: Float[Array, "motion motion"]
+    nothing: Float[Array, " slots"]
+
+    @classmethod
+    def of(cls, plant: Plant, assumed: Assumed) -> "Known":
+        picked, rows = jnp.array(assumed.coloured, dtype=int), plant.friction.direction
+        memory, remembered = assumed.colour[:, 0], assumed.colour[:, 1] * assumed.variance[picked]
+        struck = jnp.concatenate([jnp.zeros((plant.dof, plant.dof)), jnp.eye(plant.dof), carried(plant)])
+        speeds = jnp.sum(rows[:, :, None] * assumed.velocity[None] * rows[:, None, :], (1, 2))
+        return cls(
+            inverse_mass(plant),
+            assumed.variance.at[picked].add(-remembered),
+            _beside(_ramps(len(assumed.wandering)), jnp.diag(memory)),
+            _beside(_about_slopes(assumed.wander[:, 1]), jnp.diag((1.0 - memory**2) * remembered)),
+            struck @ assumed.velocity @ struck.T,
+            _NOTHING * jnp.sqrt(speeds),
+        )
 
 
-class Drive(NamedTuple):
-    """What of the inputs of all samples depends on the plant where a sensor is late: the force, and what drove it
-    earlier, for every channel delay."""
-
-    force: Float[Array, "n halves dof"]
-    before: tuple[tuple[Array, Array], ...]
-
-
-class Sample(NamedTuple):
-    """The other inputs of all samples."""
-
-    base: Float[Array, "n halves"]
-    time: Float[Array, " n"]
-    values: Float[Array, "n channels"]
-    use: Float[Array, "n channels"]
-    valid: Float[Array, " n"]
+def begun(plant: Plant, assumed: Assumed, x0, v0, force: Float[Array, "3 dof"], base: Float[Array, " 3"], time, step):
+    """State of a lane before its first sample, which begins with these forces; hidden states are relaxed."""
+    motion, past = begin(plant, inverse_mass(plant), x0, v0, Fine(force[None], base[None], time[None], step))
+    beyond_doubt, zeros = jnp.full(len(plant.friction), _FAR), jnp.zeros(len(zeros_of(assumed)))
+    return State(*motion[:3], motion.mode.astype(int), past, assumed.begin(), beyond_doubt, zeros)
 
 
-def begun(
-    plant: Plant, fine: Fine, readings: Readings, start: Start, log_scale: Float[Array, " channels"]
-) -> tuple[Known, State, Drive]:
-    """A run of the filter before its first sample."""
-    minv = inverse_mass(plant)
-    fine = punctual(plant, fine)
-    motion, past = begin(plant, minv, start.x, start.v, fine)
-    variances, picked = readings.variance * jnp.exp(log_scale), jnp.array(readings.coloured, dtype=int)
-    memory, remembered = readings.colour[:, 0], readings.colour[:, 1] * variances[picked]
-    known = Known(
-        minv,
-        variances.at[picked].add(-remembered),
-        _beside(_ramps(len(readings.wandering)), jnp.diag(memory)),
-        _beside(_about_slopes(readings.wander[:, 1]), jnp.diag((1.0 - memory**2) * remembered)),
-    )
-    beyond_doubt = jnp.full(len(plant.friction), _FAR)
-    zeros = jnp.zeros(len(readings.zeros))
-    covariance = _beside(start.covariance, _beside(_about_slopes(readings.wander[:, 0]), jnp.diag(remembered)))
-    state = State(*motion[:3], motion.mode.astype(int), past, covariance, beyond_doubt, zeros)
-    return known, state, Drive(fine.force, tuple(drive_before(fine, tau) for tau in plant.channel_delay))
+def run(
+    plants: Plant, assumed: Assumed, show: Readout, stretch: Stretch, dt, states: State, *, one_kernel: bool = False
+) -> tuple[State, Innovations]:
+    """States of all lanes after a stretch, and their innovations, each (n, lanes, channels).
+
+    `plants`, `assumed` and `states` have a leading axis of lanes on every leaf that is no whole number, states on all.
+    A sample with ``use = 0`` is predicted, not used: many of them in a row are a free prediction with its error bar. A
+    delay reaches back into the means of the filter. Lanes share what rarely happens, a reversal: all pay when one of
+    them has it. As `one_kernel` the loop is faster where it can be one.
+    """
+    of_zeros, alone = zeros_of(assumed), on_lanes(plants).first()
+
+    def loop(plants, known, show, dt, states, stretch):
+        return jax.lax.scan(partial(_sample, on_lanes(plants), known, show, of_zeros, dt), states, stretch)
+
+    small = 2 * alone.dof + alone.hidden + len(of_zeros) <= _FEW and alone.elementary
+    run_all = as_one_kernel(loop) if one_kernel and small else loop
+    return run_all(plants, on_lanes(plants)(Known.of, assumed), show, dt, states, stretch)
+
+
+def _sample(each: Lanes, known: Known, show, of_zeros, dt, states: State, now: Stretch) -> tuple[State, Innovations]:
+    """States of all lanes after a sample, and its innovations."""
+    force, base = jnp.moveaxis(now.force, 1, 0), now.base  # (lanes, halves, dof)
+    substeps = (base.size - 1) // 2
+
+    def read(plant, known, state, force, before):
+        g = load_of(plant, known.minv, state.motion, state.past, force, base, now.time, dt)
+        load = Load(g[:3], base[:3], now.time, dt / substeps)
+        return (*_read(plant, known, show, of_zeros, state, load, before, now.values, now.use), g)
+
+    motion, updated, zeros, past, seen, g = each(read, known, states, force, now.before)
+    after = _advanced(each, known, motion, g, base, now.time, dt)
+
+    def carry_on(plant, known, motion, after, updated, g):
+        return _carried_on(plant, known, motion, after, updated, g[substeps], now.time, dt, substeps)
+
+    covariance, overrun = each(carry_on, known, motion, after, updated, g)
+    onward = each(lambda plant, known, zeros: jnp.sum(known.onward * zeros[None, :], 1), known, zeros)
+    return State(*after[:3], after.mode.astype(int), past, covariance, overrun, onward), seen
+
+
+def _advanced(each: Lanes, known: Known, motion: Motion, g, base, time, dt) -> Motion:
+    """Motion of all lanes one sample later; `g` (lanes, halves, dof) drives them."""
+    substeps = (base.size - 1) // 2
+    h = dt / substeps
+
+    def step(motion, inputs):
+        force, base, i = inputs
+        load = Load(force, base, time + i * h, h)
+
+        def of(function):
+            return lambda plant, known, force, *rest: function(plant, known.minv, *rest, load._replace(force=force))
+
+        end = each(of(in_mode), known, force, motion)
+        if not motion.mode.shape[1]:
+            return end, None
+        over = jnp.any(each(of(any_ended), known, force, end))
+        return jax.lax.cond(over, lambda: each(of(through_events), known, force, motion, end), lambda: end), None
+
+    nodes = np.arange(substeps)[:, None] * 2 + np.arange(3)
+    inputs = jnp.moveaxis(g[:, nodes], 1, 0), base[nodes], jnp.arange(substeps)
+    if substeps == 1:
+        return step(motion, jax.tree.map(lambda a: a[0], inputs))[0]
+    return jax.lax.scan(step, motion, inputs)[0]
+
+
+def _read(plant: Plant, known: Known, show, of_zeros, state: State, load: Load, before, values, use):
+    """Motion, covariance, zeros and past of a lane once it has read a sample, and the innovations."""
+    motion, dof, rows = state.motion, plant.dof, plant.friction.direction
+    mean, updated, found = _update(
+        plant, known.minv, show, motion, state.zeros, of_zeros, state.covariance, state.overrun, load, before, values,
+        use, known.variances, known.nothing,
+    )  # fmt: skip
+    x, v, z, zeros = jnp.split(mean, [dof, 2 * dof, 2 * dof + plant.hidden])
+    # A link that sticks stays so while the update leaves it at rest; otherwise its speed decides.
+    pushed = jnp.abs(jnp.sum(rows * (v - motion.v)[None, :], 1))
+    still = (motion.mode == 0) & (pushed <= known.nothing)
+    v = v - stopping(known.minv, rows, jnp.sum(rows * v[None, :], 1), still)
+    moving = Motion(x, v, settle(plant, x, z), mode_at(plant, known.minv, x, v, z, load.force[0], load.time, still))
+    return moving, updated, zeros, remember(state.past, x, v), found
+
+
+def _carried_on(plant: Plant, known: Known, motion: Motion, after: Motion, updated, g, time, dt, substeps: int):
+    """Covariance of a lane after a sample, and how surely links rest by then; `g` drives it halfway."""
+    x, v, z = ((a + b) / 2 for a, b in zip(motion[:3], after[:3], strict=True))
+    free, rates = linearised(plant, known.minv, x, v, z, g, time + dt / 2)
+    step = _beside(_transition(plant, known.minv, motion, after, rates, dt, substeps), known.onward)
+    moving = _product(_product(step, updated), step.T) + _beside(known.added, known.stirred)
+    slope = with_friction(plant, known.minv, x, v, motion.mode, free, time + dt / 2)[0]
+    return _rest(plant, known.minv, moving, after.mode), _overrun(plant, motion, after, moving, slope, dt)
 
 
 def innovations(
@@ -207,81 +341,31 @@ def innovations(
     readings: Readings,
     noise: ProcessNoise,
     start: Start,
-    log_scale,
+    log_scale: Float[Array, " channels"],
     *,
     one_kernel: bool = False,
 ) -> Innovations:
-    """Innovations of one filter run.
+    """Innovations (n, channels) of one run, to be traced.
 
-    `log_scale` (channels,) is the logarithm of the factor on each channel's noise variance. A sample with ``use = 0``
-    is predicted, not used: a stretch of such samples is a free prediction with its own error bar. A delay reaches back
-    into the means of the filter. Where not many run at once, `one_kernel` is faster.
+    `log_scale` is the logarithm of the factor on each channel's noise variance.
     """
-    known, state, drive = begun(plant, fine, readings, start, log_scale)
-
-    def body(state, inputs):
-        return one_sample(plant, known, show, noise, fine.step, readings.zeros, state, *inputs)
-
-    loop = loop_of(plant, readings, one_kernel)
-    return loop(body, state, (drive, samples_of(fine, readings)))[1]
-
-
-def samples_of(fine: Fine, readings: Readings) -> Sample:
-    """Inputs of all samples that no plant changes."""
-    return Sample(fine.base, fine.time, readings.values, readings.use, readings.valid)
-
-
-def loop_of(plant: Plant, readings: Readings, one_kernel: bool) -> Callable[..., Any]:
-    """`jax.lax.scan`, or the one kernel that is asked for, where the filter of this plant can be one."""
-    small = 2 * plant.dof + plant.hidden + len(readings.zeros) <= _FEW and plant.elementary
-    return one_kernel_scan if one_kernel and small else jax.lax.scan
-
-
-def one_sample(
-    plant: Plant,
-    known: Known,
-    show: Readout,
-    noise: ProcessNoise,
-    dt,
-    of_zeros: tuple[int | None, ...],
-    state: State,
-    drive: Drive,
-    sample: Sample,
-) -> tuple[State, Innovations]:
-    """State one sample later, and the innovations of this one; `drive` and `sample` are what comes with it."""
-    (minv, variances, onward, stirred), motion, past = known, state.motion, state.past
-    dof, rows = plant.dof, plant.friction.direction
-    substeps = (drive.force.shape[0] - 1) // 2
-    struck = jnp.concatenate([jnp.zeros((dof, dof)), jnp.eye(dof), carried(plant)])
-    added = _product(_product(struck, noise.velocity), struck.T)
-    nothing = _NOTHING * jnp.sqrt(jnp.sum(rows[:, :, None] * noise.velocity[None] * rows[:, None, :], (1, 2)))
-    base, time = sample.base, sample.time
-    g = load_of(plant, minv, motion, past, drive.force, base, time, dt)
-    mean, updated, found = _update(
-        plant, minv, show, motion, state.zeros, of_zeros, state.covariance, state.overrun,
-        Load(g[:3], base[:3], time, dt / substeps), drive.before, sample.values, sample.use, variances, nothing,
+    variance = readings.variance * jnp.exp(log_scale)
+    fine, lone = punctual(plant, fine), lambda tree: jax.tree.map(lambda leaf: leaf[None], tree)
+    assumed = Assumed(
+        variance, readings.wander, readings.colour, noise.velocity, start.covariance, readings.wandering,
+        readings.coloured,
     )  # fmt: skip
-    x, v, z, zeros = jnp.split(mean, [dof, 2 * dof, 2 * dof + plant.hidden])
-    # A link that sticks stays so while the update leaves it at rest; otherwise its speed decides.
-    pushed = jnp.abs(jnp.sum(rows * (v - motion.v)[None, :], 1))
-    still = (motion.mode == 0) & (pushed <= nothing)
-    v = v - stopping(minv, rows, jnp.sum(rows * v[None, :], 1), still)
-    motion = Motion(x, v, settle(plant, x, z), mode_at(plant, minv, x, v, z, g[0], time, still))
-    keep = sample.valid > 0
-    past = remember(past, x, v, keep)
-    after = advance_sample(plant, minv, motion, g, base, time, dt)
-    x, v, z = ((a + b) / 2 for a, b in zip(motion[:3], after[:3], strict=True))
-    free, rates = linearised(plant, minv, x, v, z, g[g.shape[0] // 2], time + dt / 2)
-    step = _beside(_transition(plant, minv, motion, after, rates, dt, substeps), onward)
-    moving = _product(_product(step, updated), step.T) + _beside(added, stirred)
-    slope = with_friction(plant, minv, x, v, motion.mode, free, time + dt / 2)[0]
-    overrun = _overrun(plant, motion, after, moving, slope, dt)
-    covariance = _rest(plant, minv, moving, after.mode)
-    later = State(*after[:3], after.mode.astype(int), past, covariance, overrun, jnp.sum(onward * zeros[None, :], 1))
-    later = jax.tree.map(
-        lambda new, old: jnp.where(keep, new, old), later._replace(past=None), state._replace(past=None)
-    )
-    return later._replace(past=past), found
+    n, _, dof = fine.force.shape
+    earlier = [drive_before(fine, tau) for tau in plant.channel_delay]
+    before = [jnp.concatenate([force, base[..., None]], 2) for force, base in earlier]
+    before = jnp.stack(before, 1)[:, None] if before else jnp.zeros((n, 1, 0, 5, dof + 1))
+    stretch = Stretch(fine.force[:, :, None], fine.base, before, fine.time, readings.values, readings.use)
+    state = begun(plant, assumed, start.x, start.v, fine.force[0, :3], fine.base[0, :3], fine.time[0], fine.step)
+    floats, fixed = eqx.partition(plant, eqx.is_inexact_array)
+    found = run(
+        eqx.combine(lone(floats), fixed), lone(assumed), show, stretch, fine.step, lone(state), one_kernel=one_kernel
+    )[1]
+    return jax.tree.map(lambda leaf: leaf[:, 0], found)
 
 
 def _beside(a, b):
@@ -360,7 +444,7 @@ def _update(
     at_first = jnp.concatenate([motion.x, motion.v, motion.z])
     mean, size = jnp.concatenate([at_first, zeros]), at_first.size
     late = [
-        (channel, *_late(plant, minv, show, tau, at_first, motion.mode, load, *drive))
+        (channel, *_late(plant, minv, show, tau, at_first, motion.mode, load, drive[:, :-1], drive[:, -1]))
         for tau, channel, drive in zip(plant.channel_delay, plant.late_channel, before, strict=True)
     ]
     errors, spreads, shares = [], [], []

@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from scipy.special import expit
 
 from ..estimation._filter import ProcessNoise, Readings
 
@@ -31,12 +30,10 @@ class Colour(eqx.Module):
     louder: Float[Array, ""]
 
     @classmethod
-    def of(cls, values: Float[Array, " values"], channels: Sequence[int]) -> "Colour":
+    def of(cls, values: np.ndarray, channels: Sequence[int]) -> "Colour":
         """Colour by its logits and logarithms, those of all channels one after the other."""
         memory, share, variance = values[:-1].reshape(3, len(channels))
-        return cls(
-            tuple(channels), jax.nn.sigmoid(memory), jax.nn.sigmoid(share), jnp.exp(variance), jnp.exp(values[-1])
-        )
+        return cls(tuple(channels), expit(memory), expit(share), np.exp(variance), np.exp(values[-1]))
 
     @staticmethod
     def begin(variance: np.ndarray) -> np.ndarray:
@@ -51,9 +48,9 @@ class Colour(eqx.Module):
 
     def on(self, readings: Readings) -> Readings:
         """Readings whose noise has this colour."""
-        picked = jnp.array(self.channels)
-        variance = readings.variance.at[picked].set(self.variance)
-        colour = jnp.stack([self.memory, self.share], 1)
+        variance = np.array(readings.variance)
+        variance[list(self.channels)] = self.variance
+        colour = np.stack([self.memory, self.share], 1)
         return replace(readings, variance=variance, colour=colour, coloured=self.channels)
 
     def of_force(self, noise: ProcessNoise) -> ProcessNoise:

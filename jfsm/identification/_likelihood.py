@@ -1,250 +1,305 @@
-"""The likelihood of a structure on one record, its gradient and its information matrix, in one compiled program.
+"""The likelihood of a structure on one record: runs of the filter side by side, and what they differ by.
 
 With innovations e and their variances S,
 
     -log L = ½ Σ (e²/S + log 2πS),     F = Σ (∂e ∂eᵀ / S + ½ ∂log S ∂log Sᵀ),
 
-F being the expected information. All derivatives go forward, side by side with the filter itself, and several starts
-run as lanes of the same program.
+F being the expected information. Derivatives are differences of runs, lanes of the same program: a lane costs a tenth
+of a run by itself, the program of runs alone is compiled in a third of the time that one with derivatives takes, and no
+rule of differentiation has to know what a law does.
 """
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+import numpy as np
+from jaxtyping import Array, Bool, Float
 
-from ..dynamics._grid import Fine
+from ..dynamics._grid import Fine, Past
 from ..dynamics._imposed import Imposed
 from ..dynamics._kernel import jit_with_kernels
 from ..dynamics._plant import Plant, Readout
-from ..estimation._filter import (
-    Innovations,
-    ProcessNoise,
-    Readings,
-    Start,
-    begun,
-    innovations,
-    loop_of,
-    one_sample,
-    samples_of,
-)
+from ..estimation._filter import Assumed, Innovations, ProcessNoise, Readings, State, Stretch, begun, on_lanes, run
 from ..estimation._imposed import force_innovations
-from ._colour import Colour
-from ._layout import with_vector
+from ._drive import between_samples, forces_before, punctual_force
+from ._layout import part_of, with_vector, without_part
 
-_FEW = 32
-"""Unknowns up to which derivatives by all of them are taken in one kernel."""
+SAMPLES = 1024
+"""Samples that a program runs at a time; fewer are padded, so that one program serves records of any length."""
 _BLOCKS = 64
 """Stretches of a record whose gradients count as independent of each other."""
+_NUDGE = 1e-6
+"""Change of an unknown that shows what it does."""
+_HANDFUL, _MOSTLY = 8, 0.5
+"""Where so few readings like the greatest hold such a share of what an unknown does, a lane may have jumped: it is
+asked the other way round, too."""
+RUNS = 8
+"""Runs that a program does side by side; fewer are repeated, so that one program serves all."""
 
 
-class Lanes(eqx.Module):
-    """Parameter maps of several starts: base + rows·value(theta), the plant's numbers, then x0, v0, log scales.
+class Slopes(NamedTuple):
+    """Minus log-likelihood of some readings, and how unknowns change it.
 
-    A value is its unit times theta or exp(theta), and times exp(tie·values) where it is tied to its exponent.
+    Readings (n·channels,) stand in a row. `error` are the innovations in their standard deviations, times the square
+    `root` of how much each counts. `by_error` and `by_spread` (unknowns, n·channels) are changes of these and of the
+    logarithms of their variances; `by_share` of the logarithms of what mixtures add, or None.
     """
 
-    base: Float[Array, "lanes size"]
-    rows: Float[Array, "lanes unknowns size"]
-    unit: Float[Array, "lanes unknowns"]
-    log: Float[Array, "lanes unknowns"]
-    tie: Float[Array, "lanes unknowns unknowns"]
+    value: float
+    root: np.ndarray
+    error: np.ndarray
+    by_error: np.ndarray
+    by_spread: np.ndarray
+    by_share: np.ndarray | None
+
+    @property
+    def gradient(self) -> np.ndarray:
+        with np.errstate(all="ignore"):  # a lane that runs away is told by its value
+            slope = self.by_error @ self.error + self.by_spread @ self._by_variance
+            return slope if self.by_share is None else slope - self.by_share.sum(1)
+
+    @property
+    def information(self) -> np.ndarray:
+        with np.errstate(all="ignore"):
+            return self.by_error @ self.by_error.T + 0.5 * self.by_spread @ self.by_spread.T
+
+    @property
+    def scatter(self) -> np.ndarray:
+        """Sum of the outer products of the gradients of `_BLOCKS` stretches."""
+        scores = self.by_error * self.error + self.by_spread * self._by_variance
+        if self.by_share is not None:
+            scores = scores - self.by_share
+        begins = np.unique(-(-np.arange(_BLOCKS) * self.error.size // _BLOCKS))
+        stretches = np.add.reduceat(scores, begins[begins < self.error.size], 1)
+        return stretches @ stretches.T
+
+    @property
+    def _by_variance(self) -> np.ndarray:
+        return 0.5 * (self.root - self.error**2 / np.maximum(self.root, 1e-30))
 
 
-class _Seen(NamedTuple):
-    """Innovations (n, channels), with the logarithm of their variance."""
+def value_and_slopes(run: Callable[[np.ndarray], Innovations], theta: np.ndarray, use: np.ndarray) -> Slopes:
+    """`Slopes` at `theta` (unknowns,) of the readings that `use` (n, channels) counts.
 
-    error: Float[Array, "n channels"]
-    log_variance: Float[Array, "n channels"]
-    log_share: Float[Array, "n channels"]
+    `run` gives the innovations (lanes, n, channels) of some values (lanes, unknowns).
+    """
 
-    @classmethod
-    def of(cls, found: Innovations) -> "_Seen":
-        return cls(found.error, jnp.log(found.variance), found.log_share)
+    def in_a_row(values: np.ndarray) -> Innovations:
+        return Innovations(*(a.reshape(len(values), -1) for a in run(values)))
+
+    nudges = _NUDGE * np.eye(theta.size)
+    found, use = in_a_row(np.concatenate([theta[None], theta + nudges])), use.ravel()
+    base = Innovations(*(a[0] for a in found))
+    with np.errstate(all="ignore"):
+        root = np.sqrt(use)
+        standard = root / np.sqrt(base.variance)
+        normal = 0.5 * (base.error**2 / base.variance + np.log(2 * np.pi * base.variance))
+        value = float(np.sum(use * (normal - base.log_share)))
+        mixed = bool(np.any(base.log_share))
+
+        def changes(lanes: Innovations, nudge: float) -> list[np.ndarray]:
+            by_error = (lanes.error - base.error) * (standard / nudge)
+            by_spread = np.log(lanes.variance / base.variance) * (root / nudge)
+            return [by_error, by_spread, *([(lanes.log_share - base.log_share) * (use / nudge)] if mixed else [])]
+
+        slopes = changes(Innovations(*(a[1:] for a in found)), _NUDGE)
+        power = slopes[0] ** 2 + 0.5 * slopes[1] ** 2
+        jumped = _HANDFUL * np.max(power, 1, initial=0.0) > _MOSTLY * np.sum(power, 1)
+        if np.any(jumped):
+            back = changes(in_a_row(theta - nudges[jumped]), -_NUDGE)
+            for mine, other in zip(slopes, back, strict=True):
+                mine[jumped] = np.where(np.abs(other) < np.abs(mine[jumped]), other, mine[jumped])
+    return Slopes(value, root, base.error * standard, slopes[0], slopes[1], slopes[2] if mixed else None)
+
+
+class Runs(NamedTuple):
+    """What lanes are to do on one record.
+
+    `numbers` (lanes, size) are those of each plant, then x0, v0 and logarithms of the factors on the channels' noise;
+    `velocity` (lanes, dof, dof) is their process noise, `use` (n, channels) which readings they use, `push`
+    (lanes, n, dof), if there is any, a force that drives them as well.
+    """
+
+    numbers: np.ndarray
+    velocity: np.ndarray
+    use: np.ndarray
+    push: np.ndarray | None = None
+
+    def split(self) -> list["Runs"]:
+        """As many at a time as run side by side, the last of them repeated."""
+        count = len(self.numbers)
+        lots = [np.minimum(np.arange(i, i + RUNS), count - 1) for i in range(0, count, RUNS)]
+        return [
+            Runs(self.numbers[lot], self.velocity[lot], self.use, None if self.push is None else self.push[lot])
+            for lot in lots
+        ]
+
+
+class Scene(NamedTuple):
+    """What all lanes share: a plant (of it the numbers that parameters can change do not matter), which channels show
+    what, what is imposed, the readings, and the standard deviation (state,) of the state at the first sample."""
+
+    plant: Plant
+    show: Readout
+    fine: Fine | Imposed
+    readings: Readings
+    doubt: np.ndarray
+
+
+def innovations_of(scene: Scene, runs: Runs, count: int) -> Innovations:
+    """Innovations (lanes, count, channels) of all lanes on the first `count` samples."""
+    along = _along_motion if isinstance(scene.fine, Imposed) else _filtered
+    shape = len(runs.numbers), count, scene.readings.values.shape[1]
+    found = Innovations(np.empty(shape), np.empty(shape), np.empty(shape))
+    for k, lot in enumerate(runs.split()):
+        mine = slice(k * RUNS, min((k + 1) * RUNS, shape[0]))
+        along(scene, lot, count, Innovations(*(a[mine] for a in found)))
+    return found
+
+
+def _filtered(scene: Scene, runs: Runs, count: int, found: Innovations) -> None:
+    """Put in what a full set of lanes has `found`, or the first of them, a stretch of samples after the other."""
+    plant, numbers = without_part(scene.plant, runs.numbers, "force_delay")  # the drive has it
+    readings = scene.readings
+    noise = _Noise(
+        readings.variance, readings.wander, readings.colour, scene.doubt, readings.wandering, readings.coloured
+    )
+    leaves, static = jax.tree.flatten((plant, noise, scene.show))
+    drive, state = _Drive.of(scene, runs, count), _nowhere(plant, readings)
+    fixed = jax.device_put((leaves, numbers, runs.velocity, np.asarray(drive.fine.step)))
+    for begin in range(0, count, SAMPLES):
+        end = min(begin + SAMPLES, count)
+        stretch = drive.stretch(begin, end, np.asarray(readings.values), runs.use)
+        state, seen = _run(static, *fixed, stretch, state, np.asarray(begin == 0))
+        for whole, part in zip(found, seen, strict=True):
+            whole[:, begin:end] = np.moveaxis(np.asarray(part), 1, 0)[: len(whole), : end - begin]
+
+
+class _Noise(eqx.Module):
+    """What all lanes assume of noise, before their own factors on that of the channels."""
+
+    variance: Float[Array, " channels"]
+    wander: Float[Array, "wandering 2"]
+    colour: Float[Array, "coloured 2"]
+    doubt: Float[Array, " state"]
+    wandering: tuple[int, ...] = eqx.field(static=True)
+    coloured: tuple[int, ...] = eqx.field(static=True)
+
+    def assumed(self, log_scale: Float[Array, "lanes channels"], velocity: Float[Array, "lanes dof dof"]) -> Assumed:
+        """That of all lanes."""
+        shared = (self.wander, self.colour, jnp.diag(self.doubt**2))
+        wander, colour, start = (jnp.broadcast_to(a[None], (len(log_scale), *a.shape)) for a in shared)
+        variance = self.variance[None, :] * jnp.exp(log_scale)
+        return Assumed(variance, wander, colour, velocity, start, self.wandering, self.coloured)
 
 
 @jit_with_kernels
-def derivatives(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, doubt, until, *, one_kernel: bool):
-    """Minus log-likelihood (lanes,), its gradient (lanes, unknowns), and two matrices (lanes, unknowns, unknowns): the
-    information, and the sum of outer products of the gradients of `_BLOCKS` stretches of the record.
+def _run(
+    static: Any,
+    leaves: list[Array],
+    numbers: Float[Array, "lanes size"],
+    velocity: Float[Array, "lanes dof dof"],
+    dt: Float[Array, ""],
+    stretch: Stretch,
+    state: State,
+    first: Bool[Array, ""],
+    *,
+    one_kernel: bool,
+) -> tuple[State, Innovations]:
+    """State of all lanes after a stretch, and innovations (n, lanes, channels); the `first` one has no state yet.
 
-    Samples from index `until` on take no part. `plant` has a leading axis of lanes on every floating leaf.
+    `leaves` and `static` are a plant, `_Noise` and a readout.
     """
-    counted = readings.use * (jnp.arange(readings.valid.size) < until)[:, None] * readings.valid[:, None]
-    few = one_kernel and theta.shape[1] <= _FEW
-    if isinstance(fine, Imposed):
-        found, slopes = _slopes_of_forces(plant, lanes, theta, show, fine, readings, noise, doubt)
-    else:
-        found, slopes = _slopes_of_motion(plant, lanes, theta, show, fine, readings, noise, doubt, one_kernel=few)
-
-    def sums(found: _Seen, slopes: _Seen):
-        size, root = theta.shape[1], jnp.sqrt(counted)
-        deviation = root * jnp.exp(-found.log_variance / 2)
-        e, de, ds = found.error * deviation, slopes.error * deviation[None], slopes.log_variance * root[None]
-        normal = 0.5 * found.log_variance + 0.5 * jnp.log(2 * jnp.pi)
-        value = jnp.sum(0.5 * e**2 + counted * (normal - found.log_share))
-        de, ds, by_share = (array.reshape(size, -1) for array in (de, ds, counted[None] * slopes.log_share))
-        # d(log L)/d(theta) of every reading; their sum is the gradient, their sums over stretches tell how it scatters.
-        scores = de * e.ravel()[None] + 0.5 * ds * (root - e**2 / jnp.maximum(root, 1e-30)).ravel()[None] - by_share
-        block = jnp.arange(counted.shape[0]) * _BLOCKS // jnp.maximum(until, 1)
-        inside = jax.nn.one_hot(block, _BLOCKS, dtype=scores.dtype)
-        stretches = jnp.sum(scores.reshape(size, counted.shape[0], -1), 2) @ inside
-        return value, jnp.sum(scores, 1), de @ de.T + 0.5 * ds @ ds.T, stretches @ stretches.T
-
-    return _each(sums, theta.shape[0])(found, slopes)
-
-
-@jit_with_kernels
-def predictions(
-    plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, doubt, *, one_kernel: bool
-) -> Innovations:
-    """Innovations (lanes, n, channels) of every lane."""
-    few = one_kernel and theta.shape[1] <= _FEW
+    plant, noise, show = jax.tree.unflatten(static, leaves)
     floats, fixed = eqx.partition(plant, eqx.is_inexact_array)
 
-    def one(floats, lane, theta):
-        plant, numbers = eqx.combine(floats, fixed), _numbers(lane, theta)
-        if isinstance(fine, Imposed):
-            return _forces(plant, numbers, show, fine, readings, noise, doubt)
-        start, log_scale = _start(plant, numbers, readings, doubt)
-        plant = with_vector(plant, numbers)
-        return innovations(plant, show, fine, readings, noise, start, log_scale, one_kernel=few)
+    def lane(row: Float[Array, " size"]) -> Plant:
+        return eqx.partition(with_vector(eqx.combine(floats, fixed), row), eqx.is_inexact_array)[0]
 
-    return _each(one, theta.shape[0])(floats, lanes, theta)
+    plants = eqx.combine(jax.vmap(lane)(numbers), fixed)
+    x0, v0, log_scale = _tail(plant, numbers, noise.variance.size)
+    assumed = noise.assumed(log_scale, velocity)
+
+    def begin() -> State:
+        force, base, time = jnp.moveaxis(stretch.force[0], 1, 0), stretch.base[0], stretch.time[0]
+        return on_lanes(plants)(lambda *one: begun(*one, base, time, dt), assumed, x0, v0, force)
+
+    state = jax.lax.cond(first, begin, lambda: state)
+    return run(plants, assumed, show, stretch, dt, state, one_kernel=one_kernel)
+
+
+def _tail(plant: Plant, numbers, channels: int):
+    """x0, v0 and the logarithms of the factors on the channels' noise."""
+    dof, tail = plant.dof, numbers[:, numbers.shape[1] - 2 * plant.dof - channels :]
+    return tail[:, :dof], tail[:, dof : 2 * dof], tail[:, 2 * dof :]
+
+
+def _nowhere(plant: Plant, readings: Readings) -> State:
+    """A state of all lanes before there is any."""
+    dof, slots, reach = plant.dof, len(plant.friction), plant.reach if len(plant.delayed) else 0
+    motion, zeros = 2 * dof + plant.hidden, 2 * len(readings.wandering) + len(readings.coloured)
+    past = Past(*np.zeros((2, RUNS, reach, dof)), np.zeros(RUNS, int))
+    return State(
+        np.zeros((RUNS, dof)), np.zeros((RUNS, dof)), np.zeros((RUNS, plant.hidden)), np.zeros((RUNS, slots), int),
+        past, np.zeros((RUNS, motion + zeros, motion + zeros)), np.zeros((RUNS, slots)), np.zeros((RUNS, zeros)),
+    )  # fmt: skip
+
+
+class _Drive(NamedTuple):
+    """What drives every lane: forces (n, halves, lanes, dof) and what drove earlier (n, lanes, late, 5, dof + 1)."""
+
+    fine: Fine
+    force: np.ndarray
+    before: np.ndarray
+
+    @classmethod
+    def of(cls, scene: Scene, runs: Runs, count: int) -> "_Drive":
+        fine = scene.fine
+        assert isinstance(fine, Fine)
+        shared = np.asarray(fine.force)
+        force = np.broadcast_to(shared[:count, :, None], (*shared[:count].shape[:2], RUNS, shared.shape[2]))
+        if runs.push is not None:
+            force = force + np.moveaxis(between_samples(runs.push, shared.shape[1], count), 0, 2)
+        if scene.plant.force_delay.size:
+            delays = part_of(scene.plant, runs.numbers, "force_delay")
+            force = np.stack([punctual_force(shared, tau / fine.step)[:count] for tau in delays], 2)
+        late = part_of(scene.plant, runs.numbers, "channel_delay")
+        before = np.zeros((count, RUNS, late.shape[1], 5, shared.shape[2] + 1))
+        for lane, delay in np.ndindex(late.shape):
+            before[:, lane, delay] = forces_before(fine, late[lane, delay])[:count]
+        return cls(fine, force, before)
+
+    def stretch(self, begin: int, end: int, values: np.ndarray, use: np.ndarray) -> Stretch:
+        """The samples from `begin` to `end`, padded to as many as a program runs."""
+
+        def padded(rows: np.ndarray) -> np.ndarray:
+            found = np.zeros((SAMPLES, *rows.shape[1:]))
+            found[: end - begin] = rows[begin:end]
+            return found
+
+        base, time = np.asarray(self.fine.base), np.asarray(self.fine.time)
+        return Stretch(*map(padded, (self.force, base, self.before, time, values, use)))
+
+
+def _along_motion(scene: Scene, runs: Runs, count: int, found: Innovations) -> None:
+    """The same of the force readings along an imposed motion."""
+    rows, readings = scene.fine.time.shape[0], scene.readings
+    seen = readings.values, jnp.asarray(runs.use), readings.variance, readings.valid
+    seen = Readings(*(a if a.ndim == 1 and a.size != readings.valid.size else a[:rows] for a in seen))
+    along = _along(scene.plant, runs.numbers, scene.show, scene.fine, seen, runs.velocity, scene.doubt)
+    for whole, part in zip(found, along, strict=True):
+        whole[:] = np.asarray(part)[: len(whole), :count]
 
 
 @eqx.filter_jit
-def slope_by_colour(plant: Plant, lanes: Lanes, theta, show, fine, readings, noise, doubt, until, values, channels):
-    """Minus log-likelihood at `theta` (unknowns,) of one lane, and its gradient by the `values` of a `Colour` of these
-    channels."""
-    floats, fixed = eqx.partition(plant, eqx.is_inexact_array)
-    plant, lane = eqx.combine(jax.tree.map(lambda leaf: leaf[0], floats), fixed), jax.tree.map(lambda a: a[0], lanes)
-    counted = readings.use * (jnp.arange(readings.valid.size) < until)[:, None] * readings.valid[:, None]
+def _along(plant: Plant, numbers, show: Readout, fine: Imposed, readings: Readings, velocity, doubt) -> Innovations:
+    log_scale = _tail(plant, numbers, readings.values.shape[1])[2]
 
-    def cost(values):
-        colour = Colour.of(values, channels)
-        seen, numbers = colour.on(readings), _numbers(lane, theta)
-        start, log_scale = _start(plant, numbers, seen, doubt)
-        stirred = colour.of_force(noise)
-        found = innovations(with_vector(plant, numbers), show, fine, seen, stirred, start, log_scale)
-        value = jnp.sum(counted * (found.error**2 / found.variance / 2 + jnp.log(found.variance) / 2 - found.log_share))
-        return value, value
+    def one(numbers, velocity, log_scale):
+        lane = with_vector(plant, numbers)
+        return force_innovations(lane, show, fine, readings, ProcessNoise(velocity), doubt, log_scale)
 
-    slope, value = jax.jacfwd(cost, has_aux=True)(values)
-    return value, slope
-
-
-def _slopes_of_motion(
-    plant: Plant, lanes: Lanes, theta, show, fine: Fine, readings, noise, doubt, *, one_kernel: bool
-) -> tuple[_Seen, _Seen]:
-    """What the filter sees, and its slopes (lanes, unknowns, n, channels).
-
-    These are taken of one sample at a time, inside the loop. Those of the loop are the same, but to find them JAX goes
-    over all of what is in it several times, and programs take longer to trace.
-    """
-    count, late = theta.shape[0], plant.force_delay.size > 0
-    floats, fixed = eqx.partition(plant, eqx.is_inexact_array)
-
-    def before(floats, lane, theta):
-        plant = eqx.combine(floats, fixed)
-
-        def at(theta):
-            numbers = _numbers(lane, theta)
-            start, log_scale = _start(plant, numbers, readings, doubt)
-            known, state, drive = begun(with_vector(plant, numbers), fine, readings, start, log_scale)
-            state, modes = eqx.partition(state, eqx.is_inexact_array)
-            return ((numbers, known), state, drive if late else drive._replace(force=None)), modes
-
-        return _pushed(at, (theta,), (jnp.eye(theta.size),))
-
-    (held, state, drive), (held_slopes, state_slopes, drive_slopes), modes = _each(before, count)(floats, lanes, theta)
-
-    def body(carry, inputs):
-        force, sample, drive, drive_slopes = inputs
-
-        def one(floats, modes, at, slopes):
-            plant = eqx.combine(floats, fixed)
-
-            def onward(held, state, drive):
-                numbers, known = held
-                after, found = one_sample(
-                    with_vector(plant, numbers), known, show, noise, fine.step, readings.zeros,
-                    eqx.combine(state, modes), drive if late else drive._replace(force=force), sample,
-                )  # fmt: skip
-                after, modes_after = eqx.partition(after, eqx.is_inexact_array)
-                return (after, _Seen.of(found)), modes_after
-
-            (after, seen), (after_slopes, seen_slopes), modes_after = _pushed(onward, at, slopes)
-            return (after, after_slopes, modes_after), (seen, seen_slopes)
-
-        state, slopes, modes = carry
-        return _each(one, count)(floats, modes, (held, state, drive), (held_slopes, slopes, drive_slopes))
-
-    loop = loop_of(eqx.combine(jax.tree.map(lambda leaf: leaf[0], floats), fixed), readings, one_kernel)
-    inputs = (fine.force, samples_of(fine, readings), _moved(drive, 1, 0), _moved(drive_slopes, 2, 0))
-    found, slopes = loop(body, (state, state_slopes, modes), inputs)[1]
-    return _moved(found, 0, 1), _moved(slopes, 0, 2)
-
-
-def _slopes_of_forces(
-    plant: Plant, lanes: Lanes, theta, show, fine: Imposed, readings, noise, doubt
-) -> tuple[_Seen, _Seen]:
-    """The same of force readings along an imposed motion."""
-    floats, fixed = eqx.partition(plant, eqx.is_inexact_array)
-
-    def one(floats, lane, theta):
-        def at(theta):
-            numbers = _numbers(lane, theta)
-            found = _forces(eqx.combine(floats, fixed), numbers, show, fine, readings, noise, doubt)
-            return _Seen.of(found), None
-
-        return _pushed(at, (theta,), (jnp.eye(theta.size),))[:2]
-
-    return _each(one, theta.shape[0])(floats, lanes, theta)
-
-
-def _each(one: Callable[..., Any], count: int) -> Callable[..., Any]:
-    """What `one` makes of every lane; all arguments have a leading axis of lanes.
-
-    One lane alone is not mapped, so that what rarely happens (a reversal) is a branch.
-    """
-
-    def alone(*arguments):
-        found = one(*jax.tree.map(lambda leaf: leaf[0], arguments))
-        return jax.tree.map(lambda leaf: leaf[None], found)
-
-    return jax.vmap(one) if count > 1 else alone
-
-
-def _moved(tree: Any, axis: int, to: int) -> Any:
-    return jax.tree.map(lambda leaf: jnp.moveaxis(leaf, axis, to), tree)
-
-
-def _pushed(function: Callable[..., Any], at: tuple, slopes: tuple) -> tuple[Any, Any, Any]:
-    """What `function` gives, its derivatives along each of the `slopes`, and what it gives that has none."""
-    push = partial(jax.jvp, function, at, has_aux=True)
-    return jax.vmap(push, out_axes=(None, 0, None))(slopes)
-
-
-def _numbers(lane: Lanes, theta: Float[Array, " unknowns"]) -> Float[Array, " size"]:
-    """The numbers of one lane."""
-    value = lane.unit * jnp.where(lane.log > 0, jnp.exp(jnp.where(lane.log > 0, theta, 0.0)), theta)
-    value = value * jnp.exp(lane.tie @ value)
-    return lane.base + jnp.sum(lane.rows * value[:, None], 0)
-
-
-def _start(plant: Plant, numbers, readings: Readings, doubt) -> tuple[Start, Float[Array, " channels"]]:
-    """The first state, and logarithms of the factors on the channels' noise variances."""
-    dof, channels = plant.dof, readings.values.shape[1]
-    tail = numbers[numbers.size - 2 * dof - channels :]
-    return Start(tail[:dof], tail[dof : 2 * dof], jnp.diag(doubt**2)), tail[2 * dof :]
-
-
-def _forces(plant: Plant, numbers, show: Readout, fine: Imposed, readings, noise: ProcessNoise, doubt) -> Innovations:
-    """Innovations of the force readings along an imposed motion."""
-    log_scale = numbers[numbers.size - readings.values.shape[1] :]
-    return force_innovations(with_vector(plant, numbers), show, fine, readings, noise, doubt, log_scale)
+    return jax.vmap(one)(numbers, velocity, log_scale)

@@ -150,7 +150,7 @@ def _climb(
         if not np.any(open_) or (step >= last and not np.any(open_ & (here.value < reached))):
             break
         trial = np.where(open_[:, None], start.theta + move, here.theta)
-        there = _Place(trial, *_finite(posterior.evaluate(trial, slack, first)))
+        there = _Place(trial, *_finite(posterior.evaluate(trial, slack, first, open_)))
         better = open_ & (there.value < here.value)
         failed = open_ & ~better & (astray | (damp >= _WALL) | ~np.isfinite(there.value))
         astray = open_ & ~better & ~failed

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-import jax.numpy as jnp
 import numpy as np
 
 from ..dynamics._drive import Reconstruction
@@ -173,12 +172,12 @@ class Nuisances:
     def showing(self, values: np.ndarray) -> "Nuisances":
         """The same record, had its channels shown `values` (n, channels)."""
         values = np.pad(values, ((0, self.readings.valid.size - len(values)), (0, 0)))
-        return replace(self, readings=replace(self.readings, values=jnp.asarray(values)))
+        return replace(self, readings=replace(self.readings, values=values))
 
     def with_wandering(self, channels: Sequence[int]) -> "Nuisances":
         """The same record, the zeros of these channels wandering by up to the size of their readings."""
         size, n = self.spread[list(channels)], self.samples
-        wander = jnp.asarray(np.stack([(size / n) ** 2, 3 * size**2 / n**3], 1))
+        wander = np.stack([(size / n) ** 2, 3 * size**2 / n**3], 1)
         return replace(self, readings=replace(self.readings, wander=wander, wandering=tuple(channels)))
 
     def with_colour(self, colour: Colour) -> "Nuisances":
@@ -203,16 +202,6 @@ class Nuisances:
         remembers."""
         seen = self if other.colour is None else self.with_colour(other.colour)
         return seen.with_wandering(other.readings.wandering)
-
-    def pushed(self, force: np.ndarray) -> Fine:
-        """What drives the record, and another force (n, dof) as well."""
-        fine = self.fine
-        assert isinstance(fine, Fine)
-        samples, halves, dof = fine.force.shape
-        places = (np.arange(samples)[:, None] + np.linspace(0.0, 1.0, halves)[None, :]).ravel()
-        between = [np.interp(places, np.arange(len(force)), force[:, j]) for j in range(dof)]
-        added = np.stack(between, 1).reshape(samples, halves, dof)
-        return Fine(fine.force + jnp.asarray(added), fine.base, fine.time, fine.step)
 
     def resolving(self, structures: Sequence[Structure], least: int = 1) -> "Nuisances":
         """The same record with steps short enough for all of these structures, so many per sample at `least`."""
@@ -355,7 +344,7 @@ def _prepare_imposed(record: Record, model: Structure, reconstruction: Reconstru
         show=readout(channels, model.dof),
         fine=path.imposed(imposed_substeps(model, record.dt, typical_size(record)), bucket(len(record))),
         readings=_padded(values, use, floor**2),
-        noise=ProcessNoise(jnp.zeros((model.dof, model.dof))),
+        noise=ProcessNoise(np.zeros((model.dof, model.dof))),
         force_floor=none[:0],
         base_floor=0.0,
         force_covariance=np.zeros((model.dof, model.dof)),
@@ -385,10 +374,10 @@ def _padded(values: np.ndarray, use: np.ndarray, variance: np.ndarray) -> Readin
     n, padded = len(values), bucket(len(values))
     fill = ((0, padded - n), (0, 0))
     return Readings(
-        values=jnp.asarray(np.pad(values, fill)),
-        use=jnp.asarray(np.pad(use, fill)),
-        variance=jnp.asarray(variance),
-        valid=jnp.asarray(np.arange(padded) < n, dtype=jnp.float64),
+        values=np.pad(values, fill),
+        use=np.pad(use, fill),
+        variance=variance,
+        valid=(np.arange(padded) < n).astype(float),
     )
 
 
@@ -398,7 +387,7 @@ def _disturbance(
     """What the noise of what drives and what is never explained do to the velocity in a sample."""
     inverse, size = np.linalg.inv(mass), omega**2 * length
     forced = inverse @ (force_covariance * dt**2) @ inverse.T
-    return ProcessNoise(jnp.asarray(forced + np.eye(len(mass)) * (_LEAST_DISTURBANCE * size) ** 2 / omega * dt))
+    return ProcessNoise(forced + np.eye(len(mass)) * (_LEAST_DISTURBANCE * size) ** 2 / omega * dt)
 
 
 def _start(

@@ -3,37 +3,29 @@
 import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import minimize
 
-from ..dynamics._grid import Fine
 from ..dynamics._imposed import Imposed
-from ..dynamics._plant import Grid, Plant, Readout, hidden_width, numbers_of
-from ..estimation._filter import Innovations, ProcessNoise, Readings
+from ..dynamics._plant import Grid, Plant, hidden_width, numbers_of
+from ..estimation._filter import Innovations, ProcessNoise
 from ..structures import AbstractFriction, ChannelDelay, ForceDelay, Structure
 from ._colour import Colour
 from ._layout import plant_rows, plant_vector
-from ._likelihood import Lanes, derivatives, predictions, slope_by_colour
+from ._likelihood import Runs, Scene, Slopes, innovations_of, value_and_slopes
 from ._nuisances import Nuisances
 from ._unknowns import Unknown, values_of
 
 LANES = 2
-"""Starts that run side by side where nothing sticks; fewer are repeated, so that one program serves all."""
+"""Starts that climb side by side where nothing sticks."""
 _KNOWN_START, _HIDDEN_START = 1e-6, 0.3
 """Doubt about the initial state, and about hidden states there, as shares of the motion's size."""
-_WIDTHS = (16, 20, 24, 32, 48, 64, 96, 128)
 
 
 def lanes_of(structure: Structure) -> int:
-    """Starts of such a structure that run side by side.
-
-    Where links stick, one alone: a reversal is a branch then, which costs nothing while there is none. And one where a
-    sensor is late, which has no second start.
-    """
+    """Starts of such a structure that climb side by side: one alone where links stick, or a sensor is late."""
     sticks = any(isinstance(term, AbstractFriction) for term in structure.terms)
     return 1 if sticks or _is_late(structure) else LANES
 
@@ -58,7 +50,7 @@ class Hypothesis:
 
 
 class Posterior:
-    """Value, gradient and information of minus the log-posterior for `LANES` starts of one hypothesis.
+    """Value, gradient and information of minus the log-posterior for some starts of one hypothesis.
 
     `until` (one per record) ends the samples that count.
     """
@@ -66,12 +58,9 @@ class Posterior:
     def __init__(self, hypothesis: Hypothesis, records: Sequence[Nuisances], until: Sequence[int] | None = None):
         self.hypothesis, self.records = hypothesis, tuple(records)
         self.until = tuple(n.samples for n in records) if until is None else tuple(until)
-        count = len(hypothesis.structures)
-        lanes = lanes_of(hypothesis.structures[0])
-        if count > lanes:
-            raise ValueError(f"At most {lanes} starts fit into one call; got {count}.")
-        self._pick = [min(i, count - 1) for i in range(lanes)]
-        self._parts = [self._part(index, nuisances) for index, nuisances in enumerate(self.records)]
+        if self.lanes > (most := lanes_of(hypothesis.structures[0])):
+            raise ValueError(f"At most {most} starts fit into one call; got {self.lanes}.")
+        self._parts = [[self._part(n, index, lane) for lane in range(self.lanes)] for index, n in enumerate(records)]
 
     @property
     def lanes(self) -> int:
@@ -80,50 +69,87 @@ class Posterior:
     @property
     def program(self) -> Hashable:
         """Posteriors for which this is equal share their compiled programs."""
-        used = [(plant, maps, n.fine) for n, (plant, maps, _) in zip(self.records, self._parts, strict=True)]
-        leaves, tree = jax.tree.flatten(used)
-        return tree, tuple((leaf.shape, leaf.dtype) for leaf in leaves)
+        leaves, tree = jax.tree.flatten([parts[0].plant for parts in self._parts])
+        return tree, tuple(leaf.shape for leaf in leaves), self.records[0].readings.zeros
 
     def initial(self) -> np.ndarray:
         """Starting values (lanes, unknowns)."""
         return np.array([[u.theta for u in unknowns] for unknowns in self.hypothesis.unknowns])
 
     def evaluate(
-        self, theta: np.ndarray, slack: float = 0.0, first: bool = False
+        self, theta: np.ndarray, slack: float = 0.0, first: bool = False, lanes: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Minus log-posterior (lanes,), gradient and information.
 
         `slack` is the share of unmodelled force forgiven, no less than the record's own; of every record only its
-        `first` readings count, as many as lead to a basin, where these are asked for.
+        `first` readings count, as many as lead to a basin, where these are asked for. Of `lanes` that are not asked for
+        (lanes,) the value is infinite.
         """
-        return self._evaluate(theta, slack, first)[:3]
+        count, size = theta.shape
+        value, gradient, information = np.zeros(count), np.zeros((count, size)), np.zeros((count, size, size))
+        for lane in range(count):
+            if lanes is not None and not lanes[lane]:
+                value[lane] = np.inf
+                continue
+            value[lane], gradient[lane], curvature = prior(self.hypothesis.unknowns[lane], theta[lane])
+            information[lane] = np.diag(curvature)
+            for index, part in enumerate(self._parts):
+                found, mine = self._slopes(theta[lane], index, lane, slack, first), part[lane].mine
+                value[lane] += found.value
+                gradient[lane, mine] += found.gradient
+                information[lane][np.ix_(mine, mine)] += found.information
+        return value, gradient, information
+
+    def value(self, theta: np.ndarray) -> float:
+        """Minus log-posterior at `theta` (unknowns,) of a hypothesis with one start."""
+        total = prior(self.hypothesis.unknowns[0], theta)[0]
+        for index, (nuisances, until) in enumerate(zip(self.records, self.until, strict=True)):
+            use = np.asarray(nuisances.readings.use)[:until]
+            found = self._run(theta[None], index, 0, use, np.full(1, nuisances.forgiven), until)
+            total += value_and_slopes(lambda _, found=found: found, np.zeros(0), use).value
+        return total
 
     def scatter(self, theta: np.ndarray) -> np.ndarray:
         """Covariance (lanes, unknowns, unknowns) of the gradient as the record itself shows it, from its stretches."""
-        return self._evaluate(theta)[3]
+        total = np.zeros((*theta.shape, theta.shape[1]))
+        for index, parts in enumerate(self._parts):
+            for lane, part in enumerate(parts):
+                total[lane][np.ix_(part.mine, part.mine)] += self._slopes(theta[lane], index, lane).scatter
+        return total
 
-    def _evaluate(self, theta: np.ndarray, slack: float = 0.0, first: bool = False):
-        lanes, size = theta.shape
-        value, gradient, information = np.zeros(lanes), np.zeros((lanes, size)), np.zeros((lanes, size, size))
-        scatter = np.zeros_like(information)
-        for nuisances, end, (plant, maps, mine) in zip(self.records, self.until, self._parts, strict=True):
-            until = min(end, nuisances.leading) if first else end
-            width = maps.unit.shape[1]
-            inner = np.zeros((len(self._pick), width))
-            inner[:, : len(mine)] = theta[self._pick][:, mine]
-            seen = _Seen.of(nuisances, plant, until, max(slack, nuisances.forgiven))
-            out = derivatives(plant, maps, jnp.asarray(inner), *seen)
-            v, g, f, s = (np.asarray(o)[:lanes] for o in out)
-            value += v
-            gradient[:, mine] += g[:, : len(mine)]
-            information[:, mine[:, None], mine[None, :]] += f[:, : len(mine), : len(mine)]
-            scatter[:, mine[:, None], mine[None, :]] += s[:, : len(mine), : len(mine)]
-        for lane in range(lanes):
-            p, pg, pf = prior(self.hypothesis.unknowns[lane], theta[lane])
-            value[lane] += p
-            gradient[lane] += pg
-            information[lane] += np.diag(pf)
-        return value, gradient, information, scatter
+    def _slopes(self, theta: np.ndarray, index: int, lane: int, slack: float = 0.0, first: bool = False) -> Slopes:
+        """What the readings of record `index` say of the unknowns that act on it."""
+        nuisances, end = self.records[index], self.until[index]
+        until = min(end, nuisances.leading) if first else end
+        use, mine = np.asarray(nuisances.readings.use)[:until], self._parts[index][lane].mine
+        forgiven = max(slack, nuisances.forgiven)
+
+        def run(values: np.ndarray) -> Innovations:
+            every = np.repeat(theta[None], len(values), 0)
+            every[:, mine] = values
+            return self._run(every, index, lane, use, np.full(len(values), forgiven), until)
+
+        return value_and_slopes(run, theta[mine], use)
+
+    def _run(
+        self,
+        theta: np.ndarray,
+        index: int,
+        lane: int,
+        use: np.ndarray,
+        slack: np.ndarray,
+        until: int,
+        push: np.ndarray | None = None,
+        nuisances: Nuisances | None = None,
+    ) -> Innovations:
+        """Innovations (runs, until, channels) of record `index` at values (runs, unknowns) and slacks (runs,)."""
+        nuisances, part = self.records[index] if nuisances is None else nuisances, self._parts[index][lane]
+        fine, readings = nuisances.head(until)
+        velocity = np.stack([slackened(nuisances, share).velocity for share in slack])
+        scene = Scene(part.plant, nuisances.show, fine, readings, _doubt(part.plant, nuisances))
+        padded = np.zeros(readings.use.shape)
+        padded[:until] = use[:until]
+        return innovations_of(scene, Runs(part.numbers(theta[:, part.mine]), velocity, padded, push), until)
 
     def innovations(
         self,
@@ -140,26 +166,29 @@ class Posterior:
         `use` (n, channels) masks readings, `push` (n, dof) is a force that drives it as well, `slack` forgives
         unmodelled force as in `evaluate`. Without `noise_scales` the channels' noise is taken at its floor.
         """
-        nuisances, (plant, maps, mine) = self.records[index], self._parts[index]
-        inner = np.zeros((len(self._pick), maps.unit.shape[1]))
-        inner[:, : len(mine)] = (theta if noise_scales else self.at_the_floor(theta))[mine]
-        readings = nuisances.readings
-        if use is not None:
-            padded = np.zeros(readings.use.shape)
-            padded[: len(use)] = use
-            readings = replace(readings, use=jnp.asarray(padded) * readings.use)
-        found = predictions(
-            plant,
-            maps,
-            jnp.asarray(inner),
-            nuisances.show,
-            nuisances.fine if push is None else nuisances.pushed(push),
-            readings,
-            slackened(nuisances, slack),
-            _doubt(plant, nuisances),
-        )
-        n = nuisances.samples
-        return Innovations(*(np.asarray(array)[0, :n] for array in found))  # pyright: ignore[reportArgumentType]
+        many = self.many_innovations(
+            theta[None], index, use=use, push=None if push is None else push[None], noise_scales=noise_scales,
+            slack=np.full(1, slack),
+        )  # fmt: skip
+        return Innovations(*(a[0] for a in many))
+
+    def many_innovations(
+        self,
+        theta: np.ndarray,
+        index: int = 0,
+        *,
+        use: np.ndarray | None = None,
+        push: np.ndarray | None = None,
+        noise_scales: bool = True,
+        slack: np.ndarray | None = None,
+    ) -> Innovations:
+        """`innovations` (runs, n, channels) at values (runs, unknowns), each with its `push` and its `slack`."""
+        nuisances = self.records[index]
+        n, own = nuisances.samples, np.asarray(nuisances.readings.use)
+        masked = own[:n] if use is None else own[:n] * use
+        values = theta if noise_scales else np.stack([self.at_the_floor(one) for one in theta])
+        loose = np.zeros(len(theta)) if slack is None else slack
+        return self._run(values, index, 0, masked, loose, n, push)
 
     def at_the_floor(self, theta: np.ndarray) -> np.ndarray:
         """The same values (unknowns,), the noise of every channel as strong as it was taken to be."""
@@ -183,18 +212,27 @@ class Posterior:
 
         begin = Colour.begin(np.mean(powers, 0))
         found = minimize(cost, begin, jac=True, method="L-BFGS-B", bounds=Colour.reach(begin, loudest))
-        return Colour.of(jnp.asarray(found.x), channels)
+        return Colour.of(found.x, channels)
 
     def _slope_by_colour(
         self, theta: np.ndarray, index: int, values: np.ndarray, channels: Sequence[int]
     ) -> tuple[float, np.ndarray]:
         """Minus log-likelihood of a record at `theta`, and its gradient by the values of its noise's colour."""
-        nuisances, until, (plant, maps, mine) = self.records[index], self.until[index], self._parts[index]
-        inner = np.zeros(maps.unit.shape[1])
-        inner[: len(mine)] = theta[mine]
-        seen = _Seen.of(nuisances, plant, until)
-        value, slope = slope_by_colour(plant, maps, jnp.asarray(inner), *seen, jnp.asarray(values), tuple(channels))
-        return float(value), np.asarray(slope)
+        nuisances, until = self.records[index], self.until[index]
+        use = np.asarray(nuisances.readings.use)[:until]
+
+        def run(lanes: np.ndarray) -> Innovations:
+            found = []
+            for one in lanes:
+                colour = Colour.of(one, channels)
+                seen = replace(
+                    nuisances, readings=colour.on(nuisances.readings), noise=colour.of_force(nuisances.noise)
+                )
+                found.append(self._run(theta[None], index, 0, use, np.zeros(1), until, nuisances=seen))
+            return Innovations(*(np.concatenate(each) for each in zip(*found, strict=True)))
+
+        found = value_and_slopes(run, values, use)
+        return found.value, found.gradient
 
     def structure(self, theta: np.ndarray, lane: int = 0) -> Structure:
         """The structure with the values of one lane."""
@@ -204,79 +242,69 @@ class Posterior:
         first = {u.path: value for u, value in pairs if u.path in known}
         return self.hypothesis.structures[lane].with_values(first)
 
-    def _part(self, index: int, nuisances: Nuisances) -> tuple[Plant, Lanes, np.ndarray]:
-        """Plants and parameter maps of all lanes on one record, and which unknowns act on it."""
-        structures = [self.hypothesis.structures[i] for i in self._pick]
-        mine = np.array([k for k, u in enumerate(self.hypothesis.unknowns[0]) if u.record in (None, index)], int)
-        width = next(w for w in _WIDTHS if w >= len(mine))
+    def _part(self, nuisances: Nuisances, index: int, lane: int) -> "_Part":
+        """Plant and parameter map of a start on one record."""
+        structure, unknowns = self.hypothesis.structures[lane], self.hypothesis.unknowns[lane]
+        mine = np.array([k for k, u in enumerate(unknowns) if u.record in (None, index)], int)
         grid = Grid(float(nuisances.record.dt), nuisances.fine.substeps)
-        slots = {"smooth_slots": _slot_bucket(structures[0]), "grid": grid, "rolled": True}
-        plants = [numbers_of(s, nuisances.channels, **slots) for s in structures]
-        reach = max(plant.reach for plant in plants)  # of delays that begin far apart
-        plants = [replace(plant, reach=reach) for plant in plants]
-        packed = {}
-        for lane in set(self._pick):
-            mine_of = [self.hypothesis.unknowns[lane][k] for k in mine]
-            structure = self.hypothesis.structures[lane]
-            packed[lane] = _lane(structure, mine_of, nuisances, plant_vector(plants[lane]), width, slots)
-        maps = Lanes(*(jnp.asarray(np.stack(parts)) for parts in zip(*(packed[i] for i in self._pick), strict=True)))
-        stacked = jax.tree.map(
-            lambda *leaves: jnp.asarray(
-                np.stack(leaves) if jnp.issubdtype(leaves[0].dtype, jnp.floating) else leaves[0]
-            ),
-            *plants,
-        )
-        return stacked, maps, mine
+        slots = {"smooth_slots": _slot_bucket(structure), "grid": grid, "rolled": True}
+        return _Part.of(structure, [unknowns[k] for k in mine], nuisances, mine, slots)
 
 
-class _Seen(NamedTuple):
-    """What programs see of the first samples of a record, as many as `until`."""
+@dataclass(frozen=True)
+class _Part:
+    """A start on one record: its plant, which unknowns (`mine`) act on it, and how they make its numbers.
 
-    show: Readout
-    fine: Fine | Imposed
-    readings: Readings
-    noise: ProcessNoise
-    doubt: jax.Array
-    until: jax.Array
+    Numbers are base + rows·value(theta), the plant's, then x0, v0 and logarithms of factors on the channels' noise. A
+    value is its unit times theta or exp(theta), and times exp(tie·values) where it is tied to its exponent.
+    """
+
+    plant: Plant
+    mine: np.ndarray
+    base: np.ndarray
+    rows: np.ndarray
+    unit: np.ndarray
+    log: np.ndarray
+    tie: np.ndarray
+
+    def numbers(self, theta: np.ndarray) -> np.ndarray:
+        """Numbers (runs, size) at values (runs, unknowns)."""
+        with np.errstate(over="ignore"):
+            value = self.unit * np.where(self.log, np.exp(np.where(self.log, theta, 0.0)), theta)
+            value = value * np.exp(value @ self.tie.T)
+        return self.base + value @ self.rows
 
     @classmethod
-    def of(cls, nuisances: Nuisances, plant: Plant, until: int, slack: float = 0.0) -> "_Seen":
-        """With a `slack` of unmodelled force forgiven."""
-        fine, readings = nuisances.head(until)
-        noise, doubt = slackened(nuisances, slack), _doubt(plant, nuisances)
-        # The number of samples as a plain number would be part of the program.
-        return cls(nuisances.show, fine, readings, noise, doubt, jnp.asarray(until))
+    def of(
+        cls, structure: Structure, unknowns: Sequence[Unknown], nuisances: Nuisances, mine: np.ndarray, slots: dict
+    ) -> "_Part":
+        plant = numbers_of(structure, nuisances.channels, **slots)
+        vector, dof, channels = plant_vector(plant), structure.dof, len(nuisances.channels)
+        tail = (
+            {f"x0@{j + 1}": j for j in range(dof)}
+            | {f"v0@{j + 1}": dof + j for j in range(dof)}
+            | {f"noise@{c}": 2 * dof + c for c in range(channels)}
+        )
+        width = len(unknowns)
+        base = np.concatenate([vector, nuisances.x0, nuisances.v0, np.zeros(channels)])
+        rows, tie = np.zeros((width, base.size)), np.zeros((width, width))
+        inside = [u.path for u in unknowns if u.path not in tail]
+        found = dict(zip(inside, plant_rows(structure, inside, nuisances.channels, **slots), strict=True))
+        known = structure.values()
+        for k, u in enumerate(unknowns):
+            if u.tie:
+                tie[k, next(i for i, other in enumerate(unknowns) if other.path == u.tie[0])] = u.tie[1]
+            if u.path in tail:
+                rows[k, vector.size + tail[u.path]] = 1.0
+                base[vector.size + tail[u.path]] = 0.0
+            else:
+                rows[k, : vector.size] = found[u.path]
+                base[: vector.size] -= found[u.path] * known[u.path]
+        unit, log = np.array([u.unit for u in unknowns]), np.array([u.log for u in unknowns], bool)
+        return cls(plant, mine, base, rows, unit, log, tie)
 
 
-def _lane(structure, unknowns, nuisances: Nuisances, vector, width, slots):
-    dof, channels = structure.dof, len(nuisances.channels)
-    tail = (
-        {f"x0@{j + 1}": j for j in range(dof)}
-        | {f"v0@{j + 1}": dof + j for j in range(dof)}
-        | {f"noise@{c}": 2 * dof + c for c in range(channels)}
-    )
-    size = vector.size + 2 * dof + channels
-    base, rows = np.zeros(size), np.zeros((width, size))
-    unit, log, tie = np.zeros(width), np.zeros(width), np.zeros((width, width))
-    base[: vector.size] = vector
-    base[vector.size :] = np.concatenate([nuisances.x0, nuisances.v0, np.zeros(channels)])
-    inside = [u.path for u in unknowns if u.path not in tail]
-    found = dict(zip(inside, plant_rows(structure, inside, nuisances.channels, **slots), strict=True))
-    known = structure.values()
-    for k, u in enumerate(unknowns):
-        unit[k], log[k] = u.unit, float(u.log)
-        if u.tie:
-            tie[k, next(i for i, other in enumerate(unknowns) if other.path == u.tie[0])] = u.tie[1]
-        if u.path in tail:
-            rows[k, vector.size + tail[u.path]] = 1.0
-            base[vector.size + tail[u.path]] = 0.0
-        else:
-            rows[k, : vector.size] = found[u.path]
-            base[: vector.size] -= found[u.path] * known[u.path]
-    return base, rows, unit, log, tie
-
-
-def _doubt(plant: Plant, nuisances: Nuisances):
+def _doubt(plant: Plant, nuisances: Nuisances) -> np.ndarray:
     """Standard deviation of the state at the first sample.
 
     Displacement and velocity are among the unknowns themselves. Hidden states are not: unless the record began at rest
@@ -285,18 +313,18 @@ def _doubt(plant: Plant, nuisances: Nuisances):
     """
     share = 0.0 if nuisances.record.at_rest else 1.0
     if isinstance(nuisances.fine, Imposed):
-        return jnp.asarray(share)
+        return np.asarray(share)
     length, speed = nuisances.length, nuisances.length * nuisances.omega
     known = _KNOWN_START * np.repeat([length, speed], plant.mass.shape[-1])
     hidden = share * _HIDDEN_START * np.resize([length, speed], plant.memory.kind.shape[0] * hidden_width(plant.memory))
-    return jnp.asarray(np.concatenate([known, hidden]))
+    return np.concatenate([known, hidden])
 
 
 def _slot_bucket(structure: Structure) -> int:
     """Smooth slots of the program: one for a candidate beside a linear model, then powers of two."""
     plant = numbers_of(structure)
     count = len(plant.smooth)
-    if count == 0 and (len(plant.friction) or len(plant.memory) or len(plant.delayed) or _is_late(structure)):
+    if count == 0 and (len(plant.friction) or len(plant.memory) or len(plant.delayed)):
         return 0  # in a program of its own anyway
     return 1 if count <= 1 else 2 ** math.ceil(math.log2(count))
 
@@ -305,10 +333,10 @@ def slackened(nuisances: Nuisances, share: float) -> ProcessNoise:
     """Process noise that also forgives an unmodelled force of `share` of the elastic force."""
     if isinstance(nuisances.fine, Imposed):
         size = share * np.max(nuisances.spread[nuisances.judged])
-        return ProcessNoise(jnp.asarray(size**2 * np.eye(nuisances.fine.a.shape[1])))
+        return ProcessNoise(size**2 * np.eye(nuisances.fine.a.shape[1]))
     size = share * nuisances.omega**2 * nuisances.length
     forgiven, known = size**2 / nuisances.omega * nuisances.record.dt, np.asarray(nuisances.noise.velocity)
-    return ProcessNoise(jnp.asarray(known + forgiven * np.eye(len(known))))
+    return ProcessNoise(known + forgiven * np.eye(len(known)))
 
 
 def prior(unknowns: Sequence[Unknown], theta: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:

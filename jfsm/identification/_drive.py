@@ -1,0 +1,51 @@
+"""What drives a record between its samples, where a sensor is late or another force acts as well; on the host."""
+
+import numpy as np
+
+from ..dynamics._grid import Fine
+
+
+def between_samples(force: np.ndarray, halves: int, count: int) -> np.ndarray:
+    """Samples of a force (..., n, dof) on the half steps (..., count, halves, dof), straight in between."""
+    fill = [(0, 0)] * (force.ndim - 2) + [(0, count + 1 - force.shape[-2]), (0, 0)]
+    here = np.pad(force, fill, "edge") if count >= force.shape[-2] else force
+    here, share = here[..., : count + 1, :], np.linspace(0.0, 1.0, halves)[:, None]
+    begin, end = here[..., :-1, None, :], here[..., 1:, None, :]
+    return begin + share * (end - begin)
+
+
+def punctual_force(force: np.ndarray, delay: np.ndarray) -> np.ndarray:
+    """Force (n, halves, dof) with the delays of its sensors undone, in samples: that of t is what is read later."""
+    n, halves, dof = force.shape
+    flat = _in_a_row(force)
+    later = np.stack([_shifted(flat[:, j], delay[j] * (halves - 1)) for j in range(dof)], 1)
+    return later[np.arange(n)[:, None] * (halves - 1) + np.arange(halves)[None, :]]
+
+
+def forces_before(fine: Fine, tau: float) -> np.ndarray:
+    """Forces, and last the acceleration of the base, (n, 5, dof + 1), from each sample back to tau earlier."""
+    force, base = np.asarray(fine.force), np.asarray(fine.base)
+    n, halves, dof = force.shape
+    flat = _in_a_row(np.concatenate([force, base[..., None]], 2))
+    places = -tau / float(fine.step) * (halves - 1) * np.linspace(0.0, 1.0, 5)
+    earlier = [[_shifted(flat[:, j], place) for place in places] for j in range(dof + 1)]
+    return np.array(earlier).transpose(2, 1, 0)[: n * (halves - 1) : halves - 1]
+
+
+def _in_a_row(values: np.ndarray) -> np.ndarray:
+    """Values (n, halves, columns) on the half steps of all samples one after the other, each instant once."""
+    return np.concatenate([values[:, :-1].reshape(-1, values.shape[2]), values[-1:, -1]])
+
+
+def _shifted(values: np.ndarray, places: float) -> np.ndarray:
+    """Values so many places further on, by the cubic through four neighbours."""
+    whole = int(np.floor(places))
+    s = places - whole
+    weights = (
+        -s * (s - 1) * (s - 2) / 6,
+        (s + 1) * (s - 1) * (s - 2) / 2,
+        -(s + 1) * s * (s - 2) / 2,
+        (s + 1) * s * (s - 1) / 6,
+    )
+    index, last = np.arange(values.size) + whole, values.size - 1
+    return sum(w * values[np.clip(index + k, 0, last)] for w, k in zip(weights, (-1, 0, 1, 2), strict=True))
