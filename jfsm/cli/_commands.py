@@ -130,6 +130,9 @@ def diagnose(
     what_next: Annotated[
         bool, typer.Option("--next", help="Also say what test would tell the two likeliest causes apart.")
     ] = False,
+    time_limit: Annotated[
+        float | None, option("Seconds after which the best verdict so far is given; so does Ctrl-C.", "SECONDS")
+    ] = None,
     key: Seed = None,
 ) -> None:
     """Say what a model gets wrong about a record, why, and what mending it is worth.
@@ -143,7 +146,14 @@ def diagnose(
     records, held, believed = source.read(), source.held_out(holdout), load(model)
     with progress() as tell:
         d = diagnose(
-            records, believed, holdout=held, causes=cause, max_causes=max_causes, key=random_key(key), progress=tell
+            records,
+            believed,
+            holdout=held,
+            causes=cause,
+            max_causes=max_causes,
+            key=random_key(key),
+            time_limit=time_limit,
+            progress=tell,
         )
     if report is not None:
         d.report(report)
@@ -152,6 +162,8 @@ def diagnose(
     if extended is not None:
         d.extended.save(extended)
     d.print()  # last, so that a reader who closes the pipe loses no file
+    if not d.finished:
+        raise typer.Exit(NOT_FINISHED)
     if what_next:
         _say_what_next(d, random_key(key))
     if d.verdict != "consistent":
@@ -247,6 +259,8 @@ def demo(
     if shown.hidden is not None:
         typer.echo(shown.hidden)
     typer.echo(f"The page is {report.resolve()}.")
+    if not d.finished:
+        raise typer.Exit(NOT_FINISHED)
 
 
 @command
