@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     import jax
 
     from ..diagnosis import Diagnosis
+    from ..paper import Study
 
 
 @command
@@ -271,24 +272,29 @@ def paper(
     figures: Annotated[Path | None, option("Draw the figures into this folder, as PNG.", "DIR")] = None,
     json: Annotated[Path | None, option("Write every number here, as JSON.")] = None,
 ) -> None:
-    """Repeat the study of the paper this grew from: its numbers beside ours and the truth."""
+    """Repeat the study of the paper this grew from: its numbers beside ours and the truth.
+
+    Every table is shown and written as soon as it is done.
+    """
     from ..paper import study
 
     check_outputs({"--json": json}, [])
     if figures is not None:
         figures.mkdir(parents=True, exist_ok=True)  # before any work: what stands in its way is refused
-    with progress() as tell:
-        found = study(section, tell)
+
+    def found(part: "Study", so_far: "Study") -> None:
+        if json is not None:
+            so_far.to_json(json)
         if figures is not None:
-            found.figures(figures, tell)
-    if json is not None:
-        found.to_json(json)
-    for outcome in found.sections.values():
-        for table in outcome.tables():
+            part.figures(figures)
+        for table in (table for outcome in part.sections.values() for table in outcome.tables()):
             show_table(table.title, table.headings, table.rows)
             for note in table.notes:
                 typer.echo(f"  {note}.")
             typer.echo()
+
+    with progress() as tell:
+        study(section, tell, found)
     typer.echo("! marks what the paper prints otherwise than the truth is; errors are relative.")
 
 

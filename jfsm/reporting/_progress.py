@@ -61,6 +61,7 @@ def bar(console: Console) -> Iterator[Told]:
         console=console,
         transient=True,
         disable=not (console.is_terminal or console.is_jupyter),
+        redirect_stdout=sys.stdout.isatty(),  # what is printed for a file or a pipe is no part of the display
     ) as shown:
         task = shown.add_task("", total=None, left="")
 
