@@ -74,6 +74,8 @@ def channels(folder) -> list[object]:
 class FakeDiagnosis(SimpleNamespace):
     """Stands for a diagnosis where only what the command makes of it is of interest."""
 
+    finished = True
+
     def print(self) -> None:
         print(f"verdict: {self.verdict}")
 
@@ -82,9 +84,11 @@ def answer(monkeypatch, verdict: str = "consistent") -> dict[str, Any]:
     """Lets `diagnose` return this verdict at once; what it was called with appears in the dictionary."""
     seen: dict[str, Any] = {}
 
-    def quick(records, model, holdout, causes, max_causes, key, progress):
+    def quick(records, model, holdout, causes, max_causes, key, time_limit, progress):
         seen.update(records=records, model=model, holdout=holdout, causes=causes, max_causes=max_causes, key=key)
-        progress("looking", 1, 4)
+        seen.update(time_limit=time_limit)
+        for step, what in enumerate(("looking: here", "looking: there", "deciding"), start=1):
+            progress(what, step, 4)
         return FakeDiagnosis(verdict=verdict)
 
     monkeypatch.setattr("jfsm.diagnosis.diagnose", quick)
@@ -165,7 +169,7 @@ def test_every_kind_of_channel_has_its_option(folder, tmp_path, monkeypatch):
 def test_only_a_consistent_model_ends_with_zero(verdict, code, channels, folder, monkeypatch):
     answer(monkeypatch, verdict)
     result = run("diagnose", *channels, "--model", folder / "model.toml")
-    assert (result.exit_code, result.stdout, result.stderr) == (code, f"verdict: {verdict}\n", "")
+    assert (result.exit_code, result.stdout) == (code, f"verdict: {verdict}\n")
 
 
 @pytest.mark.parametrize(("words", "held"), [((), 0.3), (("--holdout", "none"), None), (("--holdout", "0.2"), 0.2)])
@@ -211,12 +215,13 @@ def test_a_seed_is_passed_on_and_none_is_made_up(channels, folder, monkeypatch):
     assert seen["key"] == jax.random.key(7)
 
 
-def test_a_bar_is_shown_on_a_terminal_only(channels, folder, monkeypatch):
+def test_a_bar_is_shown_on_a_terminal_and_a_line_for_every_stage_on_a_pipe(channels, folder, monkeypatch):
     answer(monkeypatch)
-    assert run("diagnose", *channels, "--model", folder / "model.toml").stderr == ""
+    piped = run("diagnose", *channels, "--model", folder / "model.toml").stderr
+    assert piped == "jfsm: 0 s: looking\njfsm: 0 s: deciding\n"
     monkeypatch.setenv("TTY_COMPATIBLE", "1")
     shown = run("diagnose", *channels, "--model", folder / "model.toml")
-    assert "1/4" in shown.stderr and "looking" in shown.stderr
+    assert "3/4" in shown.stderr and "deciding" in shown.stderr
     assert shown.stdout == "verdict: consistent\n"
 
 
@@ -249,6 +254,20 @@ def test_an_interrupted_diagnosis_says_so_and_leaves_no_file(channels, folder, t
     assert result.exit_code == 3
     assert result.stderr == "jfsm: Stopped before the end; no file was left half written.\n"
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_diagnosis_that_is_not_finished_is_written_and_has_its_own_code(channels, folder, tmp_path, monkeypatch):
+    unfinished = FakeDiagnosis(verdict="cause", finished=False, to_json=lambda path: path.write_text("{}"))
+
+    def quick(*arguments, time_limit, **options):
+        assert time_limit == 30.0
+        return unfinished
+
+    monkeypatch.setattr("jfsm.diagnosis.diagnose", quick)
+    outputs = ["--json", tmp_path / "d.json", "--time-limit", 30, "--next"]
+    result = run("diagnose", *channels, "--model", folder / "model.toml", *outputs)
+    assert (result.exit_code, result.stdout) == (3, "verdict: cause\n")
+    assert (tmp_path / "d.json").exists()
 
 
 @pytest.mark.slow  # it waits for a compiler that may swallow an interrupt
@@ -442,12 +461,13 @@ def test_a_name_that_cannot_be_fixed_is_refused(channels, folder, tmp_path):
 def test_a_model_that_is_right_and_one_that_is_too_stiff_are_told_apart(channels, folder, tmp_path):
     few = [word for cause in ("cubic_hardening", "coulomb", "force_gain") for word in ("--cause", cause)]
     right = run("diagnose", *channels, "--at-rest", "--model", folder / "model.toml", "--key", 1, *few)
-    assert (right.exit_code, right.stderr) == (0, ""), right.output
+    assert right.exit_code == 0, right.output
+    assert all(line.startswith("jfsm: ") for line in right.stderr.splitlines()), right.stderr  # stages, and no warning
     page, numbers, mended = (tmp_path / name for name in ("page.html", "d.json", "mended.toml"))
     page.write_text("of yesterday")
     outputs = ["--report", page, "--json", numbers, "--extended", mended]
     wrong = run("diagnose", *channels, "--at-rest", "--model", folder / "stiff.toml", "--key", 1, *few, *outputs)
-    assert (wrong.exit_code, wrong.stderr) == (1, ""), wrong.output
+    assert wrong.exit_code == 1, wrong.output
     assert json.loads(numbers.read_text(encoding="utf-8"))["verdict"] == "parameters"
     assert page.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
     assert Structure.load(mended).values()["stiffness@0-1.k"] == pytest.approx(STIFFNESS, rel=0.02)

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from jfsm._limit import Limit
 from jfsm._result import Result
 from jfsm.identification import Unknown
 from jfsm.identification._maximise import Maximum, _climb, _Place, _steps, finish
@@ -80,3 +81,19 @@ def test_a_climb_that_is_on_its_way_goes_on_unless_it_would_stay_far_behind(best
     found = finish(valley, Maximum(np.zeros(1), begin, np.zeros((1, 2, 2)), ()), best=best)  # pyright: ignore[reportArgumentType]
     assert (abs(found.theta[0, 0] + 1.5) < 1e-3) == goes_on
     assert (valley.asked > 40) == goes_on
+
+
+@pytest.mark.parametrize("after", [1, 7])
+def test_a_climb_whose_time_is_over_looks_once_more_at_most(after: int):
+    limit, begin = Limit(), np.array([[0.5, np.log(2 - np.exp(0.5))]])
+
+    class Watched(Valley):
+        def evaluate(self, theta, slack=0.0, most=None):
+            if self.asked + 1 == after:
+                limit.ask()
+            return super().evaluate(theta, slack, most)
+
+    valley = Watched(much=30.0)
+    start = Maximum(np.zeros(1), begin, np.zeros((1, 2, 2)), ())
+    found = finish(valley, start, limit=limit)  # pyright: ignore[reportArgumentType]
+    assert valley.asked <= after + 1 and not found.results[0].ok

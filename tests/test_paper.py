@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 import jfsm
 from jfsm.cli import app
-from jfsm.paper import FITS, Outcome, Row, noise_rows, oscillator, saturating, smooth_case, study
+from jfsm.paper import FITS, SECTIONS, Outcome, Row, noise_rows, oscillator, saturating, smooth_case, study
 from jfsm.paper._cases import (
     TITLES,
     coefficient_rows,
@@ -263,6 +263,19 @@ def test_the_command_prints_writes_and_draws(tmp_path):
     rows = json.loads((tmp_path / "paper.json").read_text())["3"]["rows"]
     assert [row["off"] for row in rows] == [False, True, False, False, False]
     assert (tmp_path / "new").is_dir()
+
+
+def test_what_is_done_is_shown_and_written_though_the_rest_is_not(tmp_path, monkeypatch):
+    def parts(tell):
+        yield Outcome((Row("first case", "k", "N/m", "9.00", 9.0, 9.0),), drawings={"figure_1": lambda figure: None})
+        raise KeyboardInterrupt
+
+    monkeypatch.setitem(SECTIONS, "2", parts)
+    arguments = ["paper", "--json", str(tmp_path / "paper.json"), "--figures", str(tmp_path / "new")]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 3 and "first case" in result.stdout
+    assert [row["quantity"] for row in json.loads((tmp_path / "paper.json").read_text())["2"]["rows"]] == ["k"]
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["figure_1.png"]
 
 
 def test_an_unknown_section_is_refused():

@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jfsm
+from jfsm._limit import UNLIMITED
 from jfsm.diagnosis import _search
 from jfsm.diagnosis._akin import beside_a_spring, instead_of, late_instead, special_cases
 from jfsm.diagnosis._begin import Begin, Start, begun
@@ -425,9 +426,10 @@ def test_starts_that_begin_best_where_more_or_less_is_forgiven_both_climb(monkey
     monkeypatch.setattr(
         _search,
         "rungs",
-        lambda start, ladder: (SimpleNamespace(value=np.array([start.top * share])) for share in (0.1, 1.0)),
+        lambda start, ladder, limit: (SimpleNamespace(value=np.array([start.top * share])) for share in (0.1, 1.0)),
     )
     lot = object.__new__(_search._Lot)
+    lot.limit = UNLIMITED
     stood = list(lot._climb(starts, ("first", "second", "third"), 1, (0.1, 0.03, 0.01)))  # pyright: ignore
     assert [float(found.value[0]) for found in stood] == [-0.5, -5.0]
     assert lot.posterior is starts[0] and lot.candidates == ("first",)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     import jax
 
     from ..diagnosis import Diagnosis
+    from ..paper import Study
 
 
 @command
@@ -130,6 +131,9 @@ def diagnose(
     what_next: Annotated[
         bool, typer.Option("--next", help="Also say what test would tell the two likeliest causes apart.")
     ] = False,
+    time_limit: Annotated[
+        float | None, option("Seconds after which the best verdict so far is given; so does Ctrl-C.", "SECONDS")
+    ] = None,
     key: Seed = None,
 ) -> None:
     """Say what a model gets wrong about a record, why, and what mending it is worth.
@@ -143,7 +147,14 @@ def diagnose(
     records, held, believed = source.read(), source.held_out(holdout), load(model)
     with progress() as tell:
         d = diagnose(
-            records, believed, holdout=held, causes=cause, max_causes=max_causes, key=random_key(key), progress=tell
+            records,
+            believed,
+            holdout=held,
+            causes=cause,
+            max_causes=max_causes,
+            key=random_key(key),
+            time_limit=time_limit,
+            progress=tell,
         )
     if report is not None:
         d.report(report)
@@ -152,6 +163,8 @@ def diagnose(
     if extended is not None:
         d.extended.save(extended)
     d.print()  # last, so that a reader who closes the pipe loses no file
+    if not d.finished:
+        raise typer.Exit(NOT_FINISHED)
     if what_next:
         _say_what_next(d, random_key(key))
     if d.verdict != "consistent":
@@ -247,6 +260,8 @@ def demo(
     if shown.hidden is not None:
         typer.echo(shown.hidden)
     typer.echo(f"The page is {report.resolve()}.")
+    if not d.finished:
+        raise typer.Exit(NOT_FINISHED)
 
 
 @command
@@ -257,24 +272,29 @@ def paper(
     figures: Annotated[Path | None, option("Draw the figures into this folder, as PNG.", "DIR")] = None,
     json: Annotated[Path | None, option("Write every number here, as JSON.")] = None,
 ) -> None:
-    """Repeat the study of the paper this grew from: its numbers beside ours and the truth."""
+    """Repeat the study of the paper this grew from: its numbers beside ours and the truth.
+
+    Every table is shown and written as soon as it is done.
+    """
     from ..paper import study
 
     check_outputs({"--json": json}, [])
     if figures is not None:
         figures.mkdir(parents=True, exist_ok=True)  # before any work: what stands in its way is refused
-    with progress() as tell:
-        found = study(section, tell)
+
+    def found(part: "Study", so_far: "Study") -> None:
+        if json is not None:
+            so_far.to_json(json)
         if figures is not None:
-            found.figures(figures, tell)
-    if json is not None:
-        found.to_json(json)
-    for outcome in found.sections.values():
-        for table in outcome.tables():
+            part.figures(figures)
+        for table in (table for outcome in part.sections.values() for table in outcome.tables()):
             show_table(table.title, table.headings, table.rows)
             for note in table.notes:
                 typer.echo(f"  {note}.")
             typer.echo()
+
+    with progress() as tell:
+        study(section, tell, found)
     typer.echo("! marks what the paper prints otherwise than the truth is; errors are relative.")
 
 

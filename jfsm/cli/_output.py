@@ -5,33 +5,22 @@ from contextlib import contextmanager
 
 import typer
 
-_PACE = 600.0
-"""Seconds over which the time left is judged: one step of a diagnosis may compile for half a minute."""
-
 
 @contextmanager
 def progress() -> Iterator[Callable[[str, int, int], None]]:
-    """A function that moves a bar on standard error: what is done, steps done, steps in all. Silent off a terminal."""
+    """A function that shows on standard error what is done, steps done, steps in all.
+
+    A bar on a terminal, a line for every stage on a pipe.
+    """
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
+
+    from ..reporting import bar, stages
 
     console = Console(stderr=True)
-    with Progress(
-        SpinnerColumn(),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.description}"),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-        speed_estimate_period=_PACE,
-    ) as bar:
-        task = bar.add_task("", total=None)
-
-        def tell(what: str, done: int, total: int) -> None:
-            bar.update(task, description=what, completed=done, total=total)
-
+    if not console.is_terminal:
+        yield stages(say)
+        return
+    with bar(console) as tell:
         yield tell
 
 

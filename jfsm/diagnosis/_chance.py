@@ -29,7 +29,7 @@ def beside_chance(trials: Sequence[Trial], problem: Problem, key: jax.Array) -> 
     model, records = problem.model, problem.records
     best = max(trials, key=lambda t: t.evidence)
     limits = any(isinstance(sensor, Clipping) for sensor in model.sensors)
-    if adequate(best) or not white(best) or limits or problem.imposed:
+    if adequate(best) or not white(best) or limits or problem.imposed or problem.limit.over:
         return list(trials)
     posterior = problem.posterior_of(best)
     runs = [free_run(posterior, best.theta, index) for index in range(len(records))]

@@ -57,7 +57,7 @@ class Decision:
     """Verdict and winning trial; probability of every alternative and reason for every candidate, in their order.
 
     The law that is `near` is of the right class at most: it is the cause where nothing else stands and runs on held-out
-    readings confirm it.
+    readings confirm it. Of a search that was `cut` short others may be right that were not tried.
     """
 
     verdict: str
@@ -66,6 +66,7 @@ class Decision:
     kappa: dict[int, float]
     why: dict[int, str]
     near: Trial | None = None
+    cut: bool = False
 
     @property
     def named_term(self) -> AbstractTerm | None:
@@ -80,6 +81,13 @@ class Decision:
         """The decision half as sure of every cause."""
         shares = {which: p / 2 if which in self.kappa else p for which, p in self.probability.items()}
         return replace(self, probability=shares)
+
+    def cut_short(self, refitted: Trial) -> "Decision":
+        """The decision of a search that was not finished: half as sure of a cause, and undecided without one."""
+        instead = replace(self.open(), near=None, cut=True)
+        if self.verdict == "cause":
+            return instead
+        return replace(instead, verdict="undecided", winner=refitted if self.winner.effects else self.winner)
 
     def refused(self, why: str, instead: Trial) -> "Decision":
         """The decision without its winner, which something else speaks against."""

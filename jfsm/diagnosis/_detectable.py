@@ -82,9 +82,12 @@ class Silence(NamedTuple):
 
 
 def detectable(trials: Sequence[Trial], silence: Silence) -> list[Smallest]:
-    """Smallest sizes of single effects that were fitted, in the shapes that the fits gave them."""
+    """Smallest sizes of single effects that were fitted, in the shapes that the fits gave them; as many as the time
+    allows."""
 
     def smallest(t: Trial) -> Smallest | None:
+        if silence.problem.limit.over:
+            return None
         seen = _Seen(t.effects, silence.problem.posterior_of(t), silence)
         return seen.smallest(t.theta, seen.factor(t.theta, t.information))
 
@@ -96,6 +99,8 @@ def naturally_detectable(candidates: Sequence[Candidate], silence: Silence) -> l
     """The same of any candidates, each in a natural shape: nothing speaks for that with which a fit of noise ends."""
     problem, every = silence.problem, []
     for candidate in candidates:
+        if problem.limit.over:
+            break
         start = modest(candidate, problem.model, problem.first)
         posterior = problem.resolving([start]).posterior([start])
         every.append(_Seen(candidate.effects, posterior, silence))
@@ -123,8 +128,10 @@ class _Seen:
     def natural(self) -> Smallest | None:
         """Its smallest size from a modest one; from that found, where it is far from modest.
 
-        None where it would have to be so large that nothing is known of what it does there.
+        None where it would have to be so large that nothing is known of what it does there, or the time is over.
         """
+        if self.silence.problem.limit.over:
+            return None
         nuisances = self.silence.nuisances
         theta = np.array([nuisances.get((u.path, u.record), u.theta) for u in self.unknowns])
         factor = self.factor(theta, self._information(theta))

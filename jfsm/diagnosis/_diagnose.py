@@ -1,15 +1,17 @@
 """From a record and a model to a verdict."""
 
 import secrets
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 import jax
 
+from .._limit import Limit, ended_by_interrupt
 from .._types import require_x64
 from ..dynamics import Reconstruction
 from ..identification import Nuisances
 from ..records import Record
+from ..reporting import shown_by_default
 from ..structures import Cause, Clipping, Structure
 from ._adequacy import ALMOST_ALL, GATE, NEGLIGIBLE, adequate
 from ._between import differences
@@ -28,8 +30,10 @@ from ._problem import Problem
 from ._report import Tested, assemble
 from ._residual import residual, stand_in
 from ._standing import UNPREDICTED
+from ._steps import Progress, Steps
 from ._study import Searched, Study
 from ._trial import Trial
+from ._unfinished import Unfinished
 from ._untold import in_step, untold
 from ._wandering import steadied
 
@@ -40,7 +44,6 @@ _SURELY = 2 * UNPREDICTED
 """Nats by which a law that leaves noise only is ahead of its absence, so that no prediction has to show it."""
 _ROUNDS = 3
 """Times that a record is looked into, at most, in which channels turn out to be late by less than a sample."""
-Progress = Callable[[str, int, int], None]
 
 
 def diagnose(
@@ -53,7 +56,8 @@ def diagnose(
     *,
     places: Sequence[tuple[int, int]] | None = None,
     reconstruction: Reconstruction = "band-limited",
-    progress: Progress | None = None,
+    time_limit: float | None = None,
+    progress: Progress | bool | None = None,
 ) -> Diagnosis:
     """What `model` gets wrong about `record`, the name of the cause, and the gain of mending it.
 
@@ -83,21 +87,49 @@ def diagnose(
         Where laws and loads are tried; by default laws on the model's links, loads on every mass.
     reconstruction : "band-limited", "linear" or "hold"
         The force between its samples: band-limited for whatever was filtered before it was sampled.
-    progress : callable, optional
-        Told of every step: what, steps done, steps in all.
+    time_limit : float, optional
+        Seconds after which the best verdict so far is given, marked as unfinished. The first interrupt (Ctrl-C) does
+        the same; a second one stops everything.
+    progress : callable or bool, optional
+        Told of every step: what, steps done, steps in all. By default a bar shows them on a terminal and in a notebook,
+        and nothing elsewhere; False shows nothing.
 
     Returns
     -------
     Diagnosis
+        Half as sure of a cause where it is not `finished`, and undecided without one.
 
     Raises
     ------
     ValueError
         If the record cannot be used, does not fit the model, or an argument is out of its range.
+    KeyboardInterrupt
+        If it is interrupted before the model itself was fitted, or for the second time.
     """
     require_x64()
     if max_causes < 1:
         raise ValueError(f"`max_causes` must be at least 1; got {max_causes}.")
+    if time_limit is not None and not time_limit > 0:
+        raise ValueError(f"`time_limit` must be positive, in seconds; got {time_limit:g}. Without it there is none.")
+    limit = Limit(time_limit)
+    with shown_by_default(progress) as told, ended_by_interrupt(limit):
+        arguments = record, model, holdout, causes, max_causes, key, places, reconstruction
+        return _diagnosed(*arguments, limit, Steps(told, 4))
+
+
+def _diagnosed(
+    record: Record | Sequence[Record],
+    model: Structure,
+    holdout: float | Record | Sequence[Record] | None,
+    causes: Sequence[str | Cause] | None,
+    max_causes: int,
+    key: jax.Array | None,
+    places: Sequence[tuple[int, int]] | None,
+    reconstruction: Reconstruction,
+    limit: Limit,
+    steps: Steps,
+) -> Diagnosis:
+    """What `diagnose` returns, within the limit."""
     key = jax.random.key(secrets.randbits(32)) if key is None else key
     training, _ = split(record, holdout)
     chosen = chosen_causes(causes)
@@ -106,10 +138,9 @@ def diagnose(
     stated = model
     for sensor in clipped:
         model = model + sensor
-    steps = _Steps(progress, 4)
 
     steps.next("the model as given and refitted")
-    study = Study(model, chosen, places, reconstruction, key, steps.next, pairs=max_causes > 1)
+    study = Study(model, chosen, places, reconstruction, key, steps, limit, pairs=max_causes > 1)
     problem, every, found, held, late = _looked_into(record, holdout, study)
     steps.next("the verdict, and its gain on held-out readings")
     judged, tried, decision, extended, gain, runs = _concluded(found, problem, clipped, model, stated, held, key)
@@ -128,8 +159,10 @@ def diagnose(
         seen = detectable(tried.trials, silence)
     if decision.verdict != "consistent":
         extended = showing_late(extended, late)
-    tested = Tested(tried.trials, tried.behind, tried.left_out, seen, tried.lack.known)
+    unfinished = Unfinished.of(chosen, tried, limit, cut=decision.cut, pairs=study.pairs)
+    tested = Tested(tried.trials, tried.behind, tried.left_out, seen, tried.lack.known, unfinished)
     leading = Leading.of(model, [refitted, *tried.trials], decision.share, first, fitted)
+    steps.end()
     return assemble(decision, clipped, refitted, tested, judged, extended, missing, gain, runs, leading)
 
 
@@ -139,6 +172,7 @@ def _looked_into(
     """What a study makes of the records, and what is held out, with channels in time that are late by less than a
     sample."""
     late: Late = {}
+    reached = None
     for _ in range(_ROUNDS):
         training, held = in_time(*split(record, holdout), late)
         studied = study.of(training, unless_later=isinstance(holdout, float))
@@ -146,11 +180,15 @@ def _looked_into(
             training, held = in_time(*split(record, holdout, first=True), late)
             studied = study.of(training, known=studied)
             assert not isinstance(studied, Trial)
-        problem, every, found = studied
-        known, late = late, slightly_late(found.every, late, problem.first.record.dt)
-        if late == known:
+        if reached is not None and study.limit.over:  # what was found before is not worth less
             break
-    return problem, every, found, held, known
+        problem, every, found = studied
+        reached = problem, every, found, held, late
+        late = slightly_late(found.every, late, problem.first.record.dt)
+        if late == reached[-1] or study.limit.over:
+            break
+    assert reached is not None
+    return reached
 
 
 def _decided(found: Searched, problem: Problem, *, lasting: bool) -> tuple[Problem, Searched, Decision]:
@@ -158,10 +196,10 @@ def _decided(found: Searched, problem: Problem, *, lasting: bool) -> tuple[Probl
 
     Where the model is wrong in a `lasting` run its predictions over some periods do not make it consistent.
     """
-    periods = sum(n.record.duration / n.period for n in problem.records)
+    periods, limit = sum(n.record.duration / n.period for n in problem.records), problem.limit
 
     def decision_of(found: Searched, problem: Problem, **how) -> Decision:
-        mapped = partial(stand_in, problem=problem)
+        mapped = (lambda t: None) if limit.over else partial(stand_in, problem=problem)
 
         def decided(trials: Sequence[Trial]) -> Decision:
             return decide(found.given, found.refitted, trials, mapped, found.lack, periods, **how)
@@ -172,8 +210,11 @@ def _decided(found: Searched, problem: Problem, *, lasting: bool) -> tuple[Probl
         return decision.open() if decision.verdict == "cause" and varies else decision
 
     told = {"untold": untold(problem.records), "in_step": in_step(problem.records), "lasting": lasting}
+    cut = limit.over
     decision = decision_of(found, problem, imposed=problem.imposed, **told)
-    again = None if decision.winner.effects else forgiving(found.every, problem)
+    again = None if decision.winner.effects or cut else forgiving(found.every, problem)
+    if cut or (again is not None and limit.over):
+        return problem, found, decision.cut_short(found.refitted)
     if again is None:
         return problem, found, decision
     problem, (given, refitted, *trials) = again
@@ -278,16 +319,3 @@ def _speaks_against(gain: Gain, decision: Decision, ahead: float, *, lasting: bo
     if (decision.verdict == "unnamed" or lasting) and gain.closable and gain.closed < GATE:
         return "closes less than half of the error on held-out readings"
     return ""
-
-
-class _Steps:
-    """Counts steps for a progress display; `more` of them may turn up on the way."""
-
-    def __init__(self, progress: Progress | None, least: int):
-        self.progress, self.done, self.least, self.total = progress, 0, least, least
-
-    def next(self, what: str, more: int = 0) -> None:
-        self.total = max(self.total, self.least + more)
-        if self.progress is not None:
-            self.progress(what, self.done, self.total)
-        self.done += 1

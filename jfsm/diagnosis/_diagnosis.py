@@ -93,9 +93,13 @@ class Diagnosis:
     """Everything that `to_json` writes and the page shows, as plain types."""
     leading: Leading | None = None
     """The two most probable explanations, where there are two; None otherwise."""
+    finished: bool = True
+    """Whether everything was looked into; if not, `notes` say what was not."""
+    untried: tuple[str, ...] = ()
+    """Ids of the causes that a search that was not finished did not try, or not to the end."""
 
     def __repr__(self) -> str:
-        return f"<Diagnosis, {self.verdict}: {self.sentence}>"
+        return f"<Diagnosis, {self.verdict}{'' if self.finished else ', not finished'}: {self.sentence}>"
 
     def next_tests(
         self, key: jax.Array | None = None, progress: Callable[[str, int, int], None] | None = None

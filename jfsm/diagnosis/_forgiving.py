@@ -31,7 +31,8 @@ def forgiving(trials: Sequence[Trial], problem: Problem) -> tuple[Problem, list[
     if not any(t.evidence < least and explained(t, refitted) >= NEARLY_ALL for t in others):
         return None
     leader = min(trials, key=lambda t: t.rung)
-    climbed = {share: settle(_forgiven(problem, share).posterior_of(leader), leader.theta) for share in _SHARES}
+    posteriors = {share: _forgiven(problem, share).posterior_of(leader) for share in _SHARES}
+    climbed = {share: settle(one, leader.theta, problem.limit) for share, one in posteriors.items()}
     best = min(climbed, key=lambda share: climbed[share].value[0])
     if climbed[best].value[0] >= leader.value:
         return None
@@ -43,7 +44,7 @@ def forgiving(trials: Sequence[Trial], problem: Problem) -> tuple[Problem, list[
 
     def again(one: Trial) -> Trial:
         posterior = problem.posterior_of(one)
-        found = settle(posterior, one.theta)
+        found = settle(posterior, one.theta, problem.limit)
         return trial(posterior, found, 0, float(found.value[0]), one.label, one.effects)
 
     given, refitted, *others = [again(compared[0]), *side_by_side(again, compared[1:])]

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from .._limit import UNLIMITED, Limit
 from ..identification import Colour, Hypothesis, Nuisances, Posterior, prepare_all
 from ..records import Record
 from ..structures import Structure
@@ -12,12 +13,14 @@ from ._trial import Trial
 
 
 class Problem(NamedTuple):
-    """A model, records as the likelihood sees them, how many samples of each are fitted, and what they do not share."""
+    """A model, records as the likelihood sees them, how many samples of each are fitted, what they do not share, and
+    how long that may go on."""
 
     model: Structure
     records: Sequence[Nuisances]
     until: Sequence[int]
     apart: Apart = Apart.nothing
+    limit: Limit = UNLIMITED
 
     @property
     def first(self) -> Nuisances:

@@ -28,24 +28,27 @@ from ._search import LeftBehind
 from ._shape import Shape, shape_of
 from ._steady import unsteady
 from ._trial import Trial
+from ._unfinished import Unfinished
 from ._wandering import zeros
 
 _SHOWN = 2000
 """Points of a curve in the report."""
 _SURE = 0.9
 """Probability of a cause from which its name is not open."""
+_GO_ON = "Let the search go on to its end before the model is changed."
 _NO_GAIN = "Do not change the model for the sake of its predictions: on held-out readings it gains no more than chance."
 
 
 class Tested(NamedTuple):
     """Candidates that were fitted, those that were only so far, those that were not, what would have been seen of which
-    size, and what other shapes would gain beside a trial, where that was asked."""
+    size, what other shapes would gain beside a trial, where that was asked, and what had not been done."""
 
     trials: list[Trial]
     behind: list[LeftBehind]
     left_out: list[Candidate]
     seen: list[Smallest]
     unfit: Callable[[Trial], float | None]
+    unfinished: Unfinished
 
 
 def assemble(
@@ -72,7 +75,7 @@ def assemble(
             for t in sorted(trials, key=lambda t: -t.evidence)
         ),
         *(_left_behind(b) for b in sorted(tested.behind, key=lambda b: b.nats)),
-        *(_passed_over(c) for c in sorted(tested.left_out, key=lambda c: -(c.share or 0.0))),
+        *(_passed_over(c, decision.cut) for c in sorted(tested.left_out, key=lambda c: -(c.share or 0.0))),
     )
     winner = decision.winner if decision.winner.label != "given" else refitted
     refit = {
@@ -81,6 +84,7 @@ def assemble(
     between = [] if decision.verdict == "consistent" else differences(winner)
     differ = [_in_each(one, _unit(winner.structure, one.path, units)) for one in between]
     said = [
+        *tested.unfinished.notes,
         *(note for n in records for note in n.notes),
         *how_run(records[0]),
         *zeros(records[0]),
@@ -96,6 +100,8 @@ def assemble(
     data = {
         "jfsm": _version(),
         "verdict": decision.verdict,
+        "finished": not tested.unfinished.notes,
+        "untried": list(tested.unfinished.untried),
         "sentence": sentence,
         "advice": advice,
         "record": _record(records),
@@ -119,6 +125,7 @@ def assemble(
         verdict=decision.verdict, findings=findings, candidates=candidates, extended=extended, refitted=refit,
         gain=gain, detectable={c: s.size for c, s in smallest.items()}, noise=noise, notes=notes,
         sentence=sentence, advice=advice, data=data, leading=leading,
+        finished=not tested.unfinished.notes, untried=tested.unfinished.untried,
     )  # fmt: skip
 
 
@@ -281,13 +288,18 @@ def _candidate(
 
 
 def _left_behind(b: LeftBehind) -> CandidateResult:
-    why = f"not pursued: {b.nats:.3g} nats behind the best where a misfit is still forgiven"
+    if math.isinf(b.nats):
+        why = "not tried: the time was over"
+    else:
+        met = "not at its top when the time was over" if b.cut else "not pursued"
+        why = f"{met}: {b.nats:.3g} nats behind the best where a misfit is still forgiven"
     return CandidateResult(names(b.effects), places(b.effects), -math.inf, {}, 0.0, 0.0, {}, why)
 
 
-def _passed_over(c: Candidate) -> CandidateResult:
+def _passed_over(c: Candidate, cut: bool) -> CandidateResult:
     share = c.share or 0.0
-    why = f"not fitted: explains {share:.0%} of the missing force, and other laws more"
+    rest = "the time was over" if cut else "other laws more"
+    why = f"not fitted: explains {share:.0%} of the missing force, and {rest}"
     return CandidateResult(names(c.effects), places(c.effects), -math.inf, {}, share, 0.0, {}, why)
 
 
@@ -318,13 +330,18 @@ def _words(
         said = " ".join(_said(f, known) for f in findings) + _remainder(decision.winner)
         if decision.near is decision.winner:
             said += " Its shape is not quite that of any law that was tried."
-        return " ".join([said, *differ]) + share, "Use the extended model." if pays else _NO_GAIN
+        if decision.cut:
+            said += " The search was not finished: what was not tried may explain it as well."
+        use = _GO_ON if decision.cut else "Use the extended model." if pays else _NO_GAIN
+        return " ".join([said, *differ]) + share, use
     if decision.verdict == "unnamed":
         looks = "" if shape is None else f" {shape.words}"
         return (
             f"A real effect is there that no catalogue entry explains; a map stands in.{looks}{share}",
             "Look at the map's shape; record a second run with another amplitude.",
         )
+    if decision.cut:
+        return "The search was ended before it was finished, and nothing that was tried until then is found.", _GO_ON
     more = "measure the velocity beside the displacement" if imposed else "measure the missing channels"
     return (
         "Something is wrong beyond noise, and this record cannot tell what.",

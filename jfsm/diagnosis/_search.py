@@ -3,6 +3,8 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -63,10 +65,12 @@ single effects close to the likeliest that are tried in its place."""
 
 
 class LeftBehind(NamedTuple):
-    """A candidate that was not pursued, and how many nats it was behind the best after the same rung."""
+    """A candidate that was not pursued, and how many nats it was behind the best after the same rung: infinitely many
+    where it had not begun when the time was over. `cut` is whether it was pursued until then."""
 
     effects: tuple[Effect, ...]
     nats: float
+    cut: bool = False
 
 
 class Found(NamedTuple):
@@ -84,7 +88,7 @@ class Found(NamedTuple):
 
 
 Tell = Callable[[str, int], None]
-"""Told of every step: what, and how many more steps there may be."""
+"""Told of every step: what, and how many more of the same kind there may be after it."""
 Beginning = tuple[Candidate, Structure, Begin | None]
 """A candidate, the structure with the size of its effect, and where it begins otherwise (None: as given)."""
 
@@ -102,7 +106,8 @@ class _Lot:
         self.label = " beside ".join(effect.label for effect in candidates[0].effects)
         self.families = families(candidates[0].effects)
         self.share = max(math.inf if candidate.share is None else candidate.share for candidate in candidates)
-        self.program, self.behind = posteriors[0].program, 0.0
+        self.program, self.behind = posteriors[0].program, math.inf
+        self.limit, self.begun, self.candidates = problem.limit, False, candidates
         self.climb = self._climb(posteriors, candidates, lanes, ladder)
 
     def _climb(self, posteriors: Sequence[Posterior], candidates: tuple[Candidate, ...], lanes: int, ladder):
@@ -110,17 +115,28 @@ class _Lot:
         # is no one knows: the best from two places climb, where these are not the same.
         chosen = [0]
         if len(posteriors) > 1:
-            begun = [[np.min(p.evaluate(p.initial(), share)[0]) for p in posteriors] for share in ladder[-2:]]
+            begun = [[self._begins(p, share) for p in posteriors] for share in ladder[-2:]]
             chosen = sorted({int(np.argmin(values)) for values in begun})
-        for stands in zip(*(rungs(posteriors[i], ladder) for i in chosen), strict=True):
+        for stands in zip(*(rungs(posteriors[i], ladder, limit=self.limit) for i in chosen), strict=True):
             found, best = min(zip(stands, chosen, strict=True), key=lambda one: np.min(one[0].value))
             self.posterior, self.candidates = posteriors[best], candidates[best * lanes :][:lanes]
             yield found
 
+    def _begins(self, posterior: Posterior, share: float) -> float:
+        """How it begins where such a share is forgiven; past the time limit no one looks."""
+        return math.inf if self.limit.over else float(np.min(posterior.evaluate(posterior.initial(), share)[0]))
+
     def step(self) -> "_Lot":
-        """On to the next rung."""
-        self.rung = next(self.climb)
+        """On to the next rung, unless the time is over."""
+        if not self.limit.over:
+            self.rung, self.begun = next(self.climb), True
         return self
+
+    def top(self, best: float) -> list[Trial]:
+        """The best start of each candidate at its top, beside the best value known; none once the time is over."""
+        if self.limit.over:
+            return []
+        return list(self.trials(finish(self.posterior, self.rung, best=best, limit=self.limit)))
 
     @property
     def best(self) -> float:
@@ -145,9 +161,9 @@ def fit_model(problem: Problem, near: Trial | None = None) -> tuple[Trial, Trial
     ladder = LADDER if near is None else LADDER[-1:]
 
     def climb(posterior: Posterior) -> tuple[Maximum, float]:
-        rung = approach(posterior, ladder)
+        rung = approach(posterior, ladder, limit=problem.limit)
         theta = np.vstack([rung.theta[:1], posterior.initial()[1:]])
-        return finish(posterior, replace(rung, theta=theta)), float(rung.value[0])
+        return finish(posterior, replace(rung, theta=theta), limit=problem.limit), float(rung.value[0])
 
     posteriors = [problem.posterior([problem.model] * both, [own] * both, refit=refit) for refit in (False, True)]
     posteriors[0].evaluate(posteriors[0].initial())  # compiled once, before both ask for it
@@ -163,11 +179,11 @@ def refit_from(beside: Sequence[Trial], refitted: Trial, problem: Problem) -> Tr
     """The model refitted, the better of two climbs: its own may have stopped below where one from own values leads that
     were found beside an effect."""
     begins = [own_part(found_in(t)) for t in sorted(beside, key=lambda t: t.value)[: lanes_of(problem.model)]]
-    if not begins:
+    if not begins or problem.limit.over:
         return refitted
     posterior = problem.posterior([problem.model] * len(begins), begins)
-    rung = approach(posterior, LADDER[-1:])
-    found = finish(posterior, rung)
+    rung = approach(posterior, LADDER[-1:], limit=problem.limit)
+    found = finish(posterior, rung, limit=problem.limit)
     again = trial(posterior, found, int(np.argmin(found.value)), float(np.min(rung.value)), refitted.label)
     return again if again.evidence > refitted.evidence else refitted
 
@@ -232,6 +248,8 @@ def search_akin(
             tried += resting(t.structure, law, begin, every, problem.model, problem.first)
         for part in t.parts:
             tried += late_instead(part, begin, effects, problem.model)
+    if problem.limit.over:
+        return known
     evidence, wider = {t.effects: t.evidence for t in known.trials}, list[Candidate]()
     ranked = sorted(close if any(map(adequate, close)) else known.trials, key=lambda t: -t.evidence)
     for t in ranked:
@@ -287,7 +305,7 @@ def _as_candidate(t: Trial, model: Structure) -> Candidate:
 
 def _from_there(tried: Sequence[Candidate], known: Found, problem: Problem, tell: Tell) -> Found:
     """What is known already, and candidates that begin from numbers that were found."""
-    if not tried:
+    if not tried or problem.limit.over:
         return known
     lots = [_Lot(beginnings, problem, _FROM_THERE.ladder) for beginnings in groups(tried, None, problem)]
     best = min(known.trials, key=lambda t: t.value)
@@ -320,7 +338,7 @@ def search_pairs(
     for _ in range(_ROUNDS):
         leader = leading(found)
         gained = leader.evidence - before.evidence
-        if gained < SIGNIFICANT and (before is not best or explained(leader, best) < GATE):
+        if problem.limit.over or gained < SIGNIFICANT and (before is not best or explained(leader, best) < GATE):
             break
         # From the leader's numbers some may arrive that stopped on their way from elsewhere. Those of its own families
         # are seen off at their tops only: laws alike tell apart late. Once it leaves noise only, others are no use.
@@ -330,7 +348,7 @@ def search_pairs(
         near = [c for c in near if families(c.effects) == kin or (others and c.effects not in done)]
         found, before = found.and_then(climbed(near, _INSTEAD, kept=kin)), leader
     leader = leading(found)
-    if leader is best:
+    if leader is best or problem.limit.over:
         return found
     kin = families(leader.effects)
     alike = [t for t in found.trials if families(t.effects) == kin and abs(leader.evidence - t.evidence) < _ALIKE]
@@ -346,36 +364,49 @@ def _each_alone(pair: Trial, model: Structure) -> list[Candidate]:
 
 
 def _climbed(lots: Sequence[_Lot], way: _Way, kept: Sequence[_Lot], best: Trial, tell: Tell) -> Found:
-    """All lots on their way up, the hopeless ones that are not `kept` only so far; `best` is known already."""
-    for together in compiled_once(lots):
-        for lot in side_by_side(_Lot.step, together):
-            tell(lot.label, 2 * len(lots))
-    pursued = lots
-    for _ in way.ladder[1:]:
+    """All lots on their way up, the hopeless ones that are not `kept` only so far; `best` is known already.
+
+    Once the time is over they stay where they are, and those that are not at their tops are left behind.
+    """
+    height = len(way.ladder)
+    on_the_first = chain.from_iterable(side_by_side(_Lot.step, together) for together in compiled_once(lots))
+    for done, lot in enumerate(on_the_first, start=1):
+        tell(lot.label, _foreseen(len(lots), way, height) - done)
+    pursued = [lot for lot in lots if lot.begun]
+    for rung in range(1, height):
         near = _near(pursued, max(way.least, int(way.share * len(pursued))))
         pursued = [lot for lot in pursued if lot in near or lot in kept]
-        list(side_by_side(_Lot.step, pursued))
+        for done, lot in enumerate(side_by_side(_Lot.step, pursued), start=1):
+            tell(lot.label, _foreseen(len(pursued), way, height - rung) - done)
     near = _near(pursued, _ALWAYS_PURSUED, best.rung)
     pursued = [lot for lot in pursued if lot in near or (way.to_the_end and lot in kept)]
 
-    def finished(lot: _Lot) -> list[Trial]:
-        return list(lot.trials(finish(lot.posterior, lot.rung, best=leader)))
-
     # The leaders go first: beside their tops the others may be left where they are.
-    trials, leader = [], best.value
+    trials, leader, done = [], best.value, 0
     ranked = sorted(pursued, key=lambda lot: lot.behind)
     for together in (ranked[:_FIRST], ranked[_FIRST:]):
-        for found in side_by_side(finished, together):
-            tell("the best candidates", 2 * len(lots))
+        for found in side_by_side(partial(_Lot.top, best=leader), together):
+            done += 1
+            tell("the best candidates", len(ranked) - done)
             trials += found
         leader = min([leader, *(t.value for t in trials)])
     trials = best_of_each(trials)
-    done, behind = {t.effects for t in trials}, dict[tuple[Effect, ...], float]()
+    fitted, behind = {t.effects for t in trials}, dict[tuple[Effect, ...], LeftBehind]()
     for lot in lots:
-        for candidate in lot.candidates:
-            if candidate.effects not in done:
-                behind[candidate.effects] = min(lot.behind, behind.get(candidate.effects, math.inf))
-    return Found(trials, [LeftBehind(effects, nats) for effects, nats in behind.items()])
+        cut = not lot.begun or lot in ranked
+        for one in (LeftBehind(candidate.effects, lot.behind, cut) for candidate in lot.candidates):
+            if one.effects not in fitted:
+                behind[one.effects] = min(one, behind.get(one.effects, one), key=lambda one: one.nats)
+    return Found(trials, list(behind.values()))
+
+
+def _foreseen(count: int, way: _Way, rungs_left: int) -> int:
+    """Steps to the tops that so many lots will take, as far as can be foreseen."""
+    steps = 0
+    for _ in range(rungs_left):
+        steps += count
+        count = min(count, max(way.least, int(way.share * count)))
+    return steps + count
 
 
 def _near(lots: Sequence[_Lot], least: int, leader: float = math.inf) -> list[_Lot]:

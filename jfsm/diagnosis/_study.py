@@ -1,11 +1,12 @@
 """How records are looked into: what they tell beside the model, and what was tried for it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import jax
 import numpy as np
 
+from .._limit import Limit
 from ..dynamics import Reconstruction
 from ..identification import prepare_all
 from ..records import Record
@@ -34,6 +35,7 @@ from ._search import (
     search_known,
     search_pairs,
 )
+from ._steps import Steps
 from ._trial import Trial
 from ._untold import in_step
 from ._wandering import PLAINLY, SLOWLY, steadied, wandering
@@ -75,7 +77,8 @@ class Study:
     places: Sequence[tuple[int, int]] | None
     reconstruction: Reconstruction
     key: jax.Array
-    tell: Callable[[str, int], None]
+    steps: Steps
+    limit: Limit
     pairs: bool
 
     def of(
@@ -86,24 +89,33 @@ class Study:
         Where what is lacking shows in what was kept back, which then has to be fitted, the best single trial beside
         which it does, `unless_later`; that is `known` then.
         """
-        problem = _problem(training, self.model, self.reconstruction)
+        problem = self._problem(training)
         parts = pieces(training, [n.period for n in problem.records])
         if parts is None:
             problem, given, refitted = _believed(problem)
-            if unless_later and _later(refitted, NEGLIGIBLE):
+            if unless_later and not self.limit.over and _later(refitted, NEGLIGIBLE):
                 return refitted
             problem, every, found = self._sought(problem, given, refitted, known)
         else:
-            part, given, refitted = _believed(_problem(parts, self.model, self.reconstruction))
+            part, given, refitted = _believed(self._problem(parts))
             part, every, ahead = self._sought(part, given, refitted, known)
-            problem, given, refitted = _believed(problem.knowing(part), near=ahead.refitted)
-            found = self._fitted_again(ahead, given, refitted, problem)
+            if not self.limit.over:
+                problem, given, refitted = _believed(problem.knowing(part), near=ahead.refitted)
+                found = self._fitted_again(ahead, given, refitted, problem)
+            if self.limit.over:
+                return part, every, ahead
             if unless_later and _later(found.refitted, NEGLIGIBLE):
                 return found.refitted
-        if unless_later and shows_later(found.every):
+        if unless_later and not self.limit.over and shows_later(found.every):
             return max((t for t in found.every if len(t.effects) < 2), key=lambda t: t.evidence)
         problem, found = self._unless_apart(found, problem)
         return problem, every, found
+
+    def _problem(self, training: Sequence[tuple[Record, int]]) -> Problem:
+        """Records, and how much of each is fitted, as the likelihood sees them."""
+        records, until = [whole for whole, _ in training], [fit for _, fit in training]
+        prepared = prepare_all(records, self.model, self.reconstruction)
+        return Problem(self.model, prepared, until, limit=self.limit)
 
     def _sought(
         self, problem: Problem, given: Trial, refitted: Trial, known: Trial | None
@@ -111,27 +123,34 @@ class Study:
         """What could be tried, and what was found; the zeros of channels may turn out to wander, or their noise to
         have a memory.
 
-        What the model lacks may have looked like that: then what was found holds as well without.
+        What the model lacks may have looked like that: then what was found holds as well without. Where the time is
+        over before that is known, what was found first is all that is told.
         """
-        channel = wandering(refitted, problem, PLAINLY)
+        self.limit.found()
+        if self.limit.over:
+            return problem, [], Searched(given, refitted, [], [], [], LackOfFit(problem))
+        channel, first = wandering(refitted, problem, PLAINLY), None
         other = None if channel is None else problem.with_wandering(channel)
         if other is None:
             every = candidates(self.model, [steadied(n) for n in problem.records], self.chosen, self.places)
-            found = self._searched(every, given, refitted, known, problem)
-            if isinstance(found, Searched):
-                return problem, every, found
-            other = found
-        other, every, found = self._sought(*_believed(other, near=refitted), known)
+            first, other = self._searched(every, given, refitted, known, problem)
+            if other is None or self.limit.over:
+                return problem, every, first
+        other, every_other, found = self._sought(*_believed(other, near=refitted), known)
         best = max(found.every, key=lambda t: t.evidence)
-        if best.effects:
-            [alone] = search_again([best], refitted, problem, self.tell).trials
-            if alone.evidence >= best.evidence:
-                return problem, every, self._fitted_again(found, given, refitted, problem)
-        return other, every, found
+        if best.effects and not self.limit.over:
+            again = search_again([best], refitted, problem, self.steps.of("the best without that"))
+            if again.trials and again.trials[0].evidence >= best.evidence:
+                found_again = self._fitted_again(found, given, refitted, problem)
+                if not self.limit.over:
+                    return problem, every_other, found_again
+        if self.limit.over and first is not None:
+            return problem, every, first
+        return other, every_other, found
 
     def _fitted_again(self, ahead: Searched, given: Trial, refitted: Trial, problem: Problem) -> Searched:
         """The best of what was found in another problem, as in pieces of long records, fitted from there."""
-        found = search_again(ahead.trials, refitted, problem, self.tell)
+        found = search_again(ahead.trials, refitted, problem, self.steps.of("the best again"))
         refitted = refit_from(found.trials, refitted, problem)
         _, (given, refitted, *trials) = self._amid_noise(given, refitted, found.trials, problem)
         return ahead.judged_in(problem, given, refitted, trials)
@@ -144,12 +163,18 @@ class Study:
         for apart in (Apart.own, Apart.all) if len(problem.records) > 1 else ():
             other, best = problem._replace(apart=apart), max(found.every, key=lambda t: t.evidence)
             if best.effects:
-                [alone] = search_again([best], best, other, self.tell).trials
+                tried = search_again([best], best, other, self.steps.of("each record by itself")).trials
             else:
-                alone = refit_from([best], best, other)
+                tried = [refit_from([best], best, other)]
+            if self.limit.over:
+                break
+            [alone] = tried
             if differ(alone.beside(best), best):
-                problem, given, refitted = _believed(other, near=found.refitted)
-                found = self._fitted_again(found, given, refitted, problem)
+                another, given, refitted = _believed(other, near=found.refitted)
+                again = self._fitted_again(found, given, refitted, another)
+                if self.limit.over:
+                    break
+                problem, found = another, again
         return problem, found
 
     def _searched(
@@ -159,10 +184,11 @@ class Study:
         refitted: Trial,
         known: Trial | None,
         problem: Problem,
-    ) -> Searched | Problem:
+    ) -> tuple[Searched, Problem | None]:
         """Single effects fitted, the promising ones first, and pairs of them where that leaves something.
 
-        The problem, instead, where beside these a channel's zero turns out to wander, or its noise to have a memory.
+        Beside them the problem to look into instead, where a channel's zero turns out to wander, or its noise to have a
+        memory.
         """
         stands_for_the_drive = in_step(problem.records)
 
@@ -174,8 +200,10 @@ class Study:
             return [t for t in trials if t is best or explained(t, refitted) >= GATE]
 
         tried, left_out = promising(every)
-        found = search(tried, given, refitted, problem, self.tell)
-        if settled(told([given, refitted, *found.trials])):
+        found = search(tried, given, refitted, problem, self.steps.of("single causes"))
+        if self.limit.over:
+            more = []
+        elif settled(told([given, refitted, *found.trials])):
             best = max(found.trials, key=lambda t: t.evidence)
             more = contained([law for t in close(found.trials) for law in t.laws], left_out)
             others = [*as_promising(best.effects, every, left_out), *elsewhere(best.effects, left_out)]
@@ -183,36 +211,41 @@ class Study:
         else:  # of a missing force that is ill seen regression may put the right law last
             more = [c for c in left_out if c.starts]
         if more:
-            found = found.and_then(search(more, given, refitted, problem, self.tell))
+            tell = self.steps.of("more single causes")
+            found = found.and_then(search(more, given, refitted, problem, tell))
             left_out = [c for c in left_out if c not in more]
-        found = search_akin(close(found.trials), every, found, problem, self.tell)
+        akin = self.steps.of("what is akin to the best")
+        found = search_akin(close(found.trials), every, found, problem, akin)
         if known is not None and known.effects:
-            found = search_known(known, found, problem, self.tell)
+            found = search_known(known, found, problem, akin)
         behind, refitted = found.behind, refit_from(found.trials, refitted, problem)
         louder, (given, refitted, *trials) = self._amid_noise(given, refitted, found.trials, problem)
         lack, alone = LackOfFit(problem), told([given, refitted, *trials])
         best = max(alone, key=lambda t: t.evidence)
+        if self.limit.over:
+            return Searched(given, refitted, trials, behind, left_out, lack), None
         if (other := coloured(best, problem)) is not None:  # noise that remembers is in part slow as well
-            return other
+            return Searched(given, refitted, trials, behind, left_out, lack), other
         if (channel := wandering(best, problem, SLOWLY)) is not None:
-            return problem.with_wandering(channel)
+            other = problem.with_wandering(channel)
+            return Searched(given, refitted, trials, behind, left_out, lack), other
         effects = _beside(alone, refitted, every, lack, imposed=problem.imposed) if self.pairs else []
         if effects:
             found = self._slightly_late(best, effects, problem)
-            found = found or search_pairs(effects, trials, known, refitted, problem, self.tell)
+            tell = self.steps.of("pairs of causes")
+            found = found or search_pairs(effects, trials, known, refitted, problem, tell)
             # By itself an effect of a pair may be likelier than any before: what is akin to it begins from there too.
             single = Found([t for t in found.trials if len(t.effects) == 1], [])
             if ahead := [t for t in single.trials if t.evidence > best.evidence]:
-                found = found.and_then(search_akin(ahead, every, single, problem, self.tell))
+                found = found.and_then(search_akin(ahead, every, single, problem, akin))
             trials = best_of_each([*trials, *(t.beside(refitted).amid(louder) for t in found.trials)])
             trials = [given, refitted, *trials]
             given, refitted, *trials = beside_chance(trials, problem, self.key)
             best = max(told([given, refitted, *trials]), key=lambda t: t.evidence)
-            if (other := coloured(best, problem)) is not None:
-                return other
             done = {t.effects for t in trials}
             behind = [one for one in (*behind, *found.behind) if one.effects not in done]
-        return Searched(given, refitted, trials, behind, left_out, lack)
+            other = None if self.limit.over else coloured(best, problem)
+        return Searched(given, refitted, trials, behind, left_out, lack), other
 
     def _slightly_late(self, best: Trial, effects: Sequence[Effect], problem: Problem) -> Found | None:
         """The best law beside a channel that is late by less than a sample, where these leave nothing but noise."""
@@ -221,7 +254,7 @@ class Study:
             return None
         for other in effects:
             if other.cause.effect is type(sensor) and other.at == sensor.at:
-                found = search_beside(best, other, sensor, problem, self.tell)
+                found = search_beside(best, other, sensor, problem, self.steps.of("what is late"))
                 slight = slightly_late(found.trials, {}, problem.first.record.dt)
                 return found if slight and settled(found.trials) else None
         return None
@@ -233,12 +266,6 @@ class Study:
         trials = [given, refitted, *(t.beside(refitted) for t in found)]
         louder = noise_beyond(trials, problem)
         return louder, beside_chance([t.amid(louder) for t in trials], problem, self.key)
-
-
-def _problem(training: Sequence[tuple[Record, int]], model: Structure, reconstruction: Reconstruction) -> Problem:
-    """Records, and how much of each is fitted, as the likelihood sees them."""
-    records, until = [whole for whole, _ in training], [fit for _, fit in training]
-    return Problem(model, prepare_all(records, model, reconstruction), until)
 
 
 def _believed(problem: Problem, near: Trial | None = None) -> tuple[Problem, Trial, Trial]:

@@ -32,8 +32,10 @@ PROCESS, DOUBT = 0.05, 2.0
 """Standard deviation of the random field that is believed beforehand, in sizes of the force, and doubt of ln of it."""
 LENGTHS = 0.05, 30.0
 """Length scales that are looked at, in standard deviations of the motion."""
-ROUNDS, CLIMB = 3, 12
-"""How often hyper-parameters and motion are found in turn, and steps of a climb."""
+ROUNDS, CLIMB, ENOUGH = 3, 12, 0.05
+"""How often hyper-parameters and motion are found in turn, steps of a climb, and nats that one step more is worth."""
+BEGIN = 400
+"""Readings, or means of them, from which a first map is learned that tells where to begin."""
 SETTLED, PASSES = 1e-3, 12
 """Change of the motion, in its standard deviations, at which passes of the smoother end, and most of them."""
 
@@ -45,6 +47,7 @@ def estimate_force_map(
     correlation: AbstractCorrelation | None = None,
     trend: str | PolynomialTrend = "quadratic",
     nodes: int = NODES,
+    motion: Motion | None = None,
 ) -> Kriging:
     """Kriging map of all the force that holds a single mass, found together with its motion.
 
@@ -66,6 +69,8 @@ def estimate_force_map(
     nodes : int
         Number of visited states at which the random field is a state of the filter. The time of a pass grows like the
         square of it.
+    motion : Motion, optional
+        What `estimate_motion` makes of the record, where that is known already.
 
     Returns
     -------
@@ -90,11 +95,11 @@ def estimate_force_map(
     """
     require_x64()
     mass = _checked(record, mass, nodes)
-    motion = estimate_motion(record)
+    motion = estimate_motion(record) if motion is None else motion
     force = record.channels.get(("force", 1), np.zeros(len(record)))
     states = np.column_stack([motion.displacement[:, 0], motion.velocity[:, 0]])
     held = force - mass * motion.acceleration[:, 0]
-    begin = Kriging.fit(states, held, correlation, trend, points=1000)
+    begin = Kriging.fit(states, held, correlation, trend, points=BEGIN)
     posterior = begin.parts[0]
     size, spread = float(np.std(held)), states.std(axis=0)
     field = Field(
@@ -237,7 +242,9 @@ def _likeliest(
     begin = np.append(np.asarray(hyper.process_std), np.asarray(hyper.length_scale))
     lengths = np.log(spread[:, None] * np.array(LENGTHS))
     bounds = [(centre - 3.0 * DOUBT, centre + 2.0 * DOUBT), *lengths.tolist()]
-    best = minimize(value, begin, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": CLIMB}).x
+    # What SciPy takes is a share of the value.
+    options = {"maxiter": CLIMB, "ftol": ENOUGH / max(abs(float(found.log_likelihood)), 1.0)}
+    best = minimize(value, begin, jac=True, method="L-BFGS-B", bounds=bounds, options=options).x
     return _hyper(best)
 
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .._limit import UNLIMITED, Limit
 from .._result import Result
 from ._posterior import Posterior
 
@@ -46,49 +47,66 @@ class Maximum:
         return float(-self.value[lane] + 0.5 * self.theta.shape[1] * np.log(2 * np.pi) - 0.5 * logdet)
 
 
-def approach(posterior: Posterior, ladder: Sequence[float] = LADDER, theta: np.ndarray | None = None) -> Maximum:
+def approach(
+    posterior: Posterior,
+    ladder: Sequence[float] = LADDER,
+    theta: np.ndarray | None = None,
+    limit: Limit = UNLIMITED,
+) -> Maximum:
     """Climb with a process noise that forgives unmodelled force, less from rung to rung.
 
     From the true noise alone, a period wrong by some per cent scores worse than no motion at all, and a climb ends
-    there.
+    there. Past its `limit` it ends on the rung where it stands.
     """
-    *_, last = rungs(posterior, ladder, theta)
-    return last
+    stands = rungs(posterior, ladder, theta, limit)
+    found = next(stands)
+    while not limit.over and (above := next(stands, None)) is not None:
+        found = above
+    return found
 
 
-def rungs(posterior: Posterior, ladder: Sequence[float] = LADDER, theta: np.ndarray | None = None) -> Iterator[Maximum]:
+def rungs(
+    posterior: Posterior,
+    ladder: Sequence[float] = LADDER,
+    theta: np.ndarray | None = None,
+    limit: Limit = UNLIMITED,
+) -> Iterator[Maximum]:
     """What `approach` stands on after each rung."""
     theta = posterior.initial() if theta is None else theta
     for share in ladder[:-1]:
-        found = _climb(posterior, theta, share, _RUNG_STEPS, _RUNG_ENOUGH, first=True)
+        found = _climb(posterior, theta, share, _RUNG_STEPS, _RUNG_ENOUGH, first=True, limit=limit)
         yield found
         theta = found.theta
-    yield _climb(posterior, theta, ladder[-1], _LAST_RUNG_STEPS, _RUNG_ENOUGH, first=True)
+    yield _climb(posterior, theta, ladder[-1], _LAST_RUNG_STEPS, _RUNG_ENOUGH, first=True, limit=limit)
 
 
-def finish(posterior: Posterior, start: Maximum, steps: int = 25, best: float = np.inf) -> Maximum:
+def finish(
+    posterior: Posterior, start: Maximum, steps: int = 25, best: float = np.inf, limit: Limit = UNLIMITED
+) -> Maximum:
     """Climb to the top with the true noise.
 
     `best` is the smallest minus log-posterior that any hypothesis reached: one that stays far above it need not be
     exact. One that is still on its way, fast enough to come near it, gets as many steps again: a long valley that bends
-    takes short ones.
+    takes short ones. Past its `limit` it stays where it is.
     """
-    theta = _climb(posterior, start.theta, _LAST_RUNG, _RUNG_STEPS, _RUNG_ENOUGH).theta
-    found = _climb(posterior, theta, 0.0, steps, _ENOUGH, best)
+    theta = start.theta
+    if not limit.over:
+        theta = _climb(posterior, theta, _LAST_RUNG, _RUNG_STEPS, _RUNG_ENOUGH, limit=limit).theta
+    found = _climb(posterior, theta, 0.0, steps, _ENOUGH, best, limit=limit)
     for _ in range(_ROUNDS - 1):
         before = found.value
-        if not any(one is Result.maximum_steps for one in found.results):
+        if limit.over or not any(one is Result.maximum_steps for one in found.results):
             break
         best = min(best, float(np.min(before)))
-        found = _climb(posterior, found.theta, 0.0, steps, _ENOUGH, best)
+        found = _climb(posterior, found.theta, 0.0, steps, _ENOUGH, best, limit=limit)
         if np.all(before < found.value + np.maximum(found.value - best, _WORTH) / _ROUNDS):
             break
     return found
 
 
-def settle(posterior: Posterior, theta: np.ndarray) -> Maximum:
+def settle(posterior: Posterior, theta: np.ndarray, limit: Limit = UNLIMITED) -> Maximum:
     """Climb from values (unknowns,) that are near the top, of a hypothesis with one start."""
-    return _climb(posterior, theta[None], 0.0, 25, _ENOUGH)
+    return _climb(posterior, theta[None], 0.0, 25, _ENOUGH, limit=limit)
 
 
 def maximise(posterior: Posterior) -> Maximum:
@@ -118,8 +136,9 @@ def _climb(
     enough: float,
     best: float = np.inf,
     first: bool = False,
+    limit: Limit = UNLIMITED,
 ) -> Maximum:
-    """The top from `theta` by damped steps.
+    """The top from `theta` by damped steps, or past its `limit` how far they came.
 
     In a narrow valley that bends, a long step along it ends on the wall. So a step that leads up is not taken back at
     once: a second one, from where it led and straight down, may end below where both began.
@@ -135,6 +154,8 @@ def _climb(
     open_, results = np.ones(lanes, bool), [Result.maximum_steps] * lanes
     last, reached = steps, np.inf
     for step in range(steps):
+        if limit.over:
+            break
         start = beyond.where(astray, here)
         damping = np.where(astray, np.maximum(damp, _WALL), damp)
         move, promise = _steps(start, damping, low, high, log)

@@ -1,7 +1,7 @@
 """Section 4: the constants of each system read off its force state map by RKPM, (72) to (91)."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -62,7 +62,7 @@ FIGURES = {
 }  # fmt: skip
 
 
-def section_4(tell: Tell) -> Outcome:
+def section_4(tell: Tell) -> Iterator[Outcome]:
     """Cases 1 to 5."""
     parts: list[tuple[str, Callable[[], Outcome]]] = [
         *((TITLES[name], lambda name=name: smooth_case(name)) for name in COEFFICIENTS),
@@ -71,11 +71,10 @@ def section_4(tell: Tell) -> Outcome:
         *((TITLES[name], lambda name=name: rough_case(name)) for name in ("bilinear", "coulomb", "bilinear_coulomb")),
         ("Case 5, two masses with dry friction", friction_chain_case),
     ]
-    outcomes = []
+    yield _choices()
     for done, (title, part) in enumerate(parts):
         tell(title, done, len(parts))
-        outcomes.append(part())
-    return joined(_choices(), *outcomes)
+        yield part()
 
 
 def _choices() -> Outcome:

@@ -1,13 +1,13 @@
 """Section 2.3: Examples 1 to 3 with their jumps and kinks found, and section 3: how many functions a trend has."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from ..surrogates import RKPM, Discontinuity, PolynomialTrend, find_discontinuities
 from ..systems import EXAMPLES
 from ._figures import draw_example, draw_shape_functions
-from ._rows import Outcome, Row, Tell, joined
+from ._rows import Outcome, Row, Tell
 
 SPACING = 0.01
 SUPPORT = 6
@@ -22,13 +22,11 @@ LINES = {  # kind, place, jump or change of slope
 FIGURES = {"example_1": 5, "example_2": 7, "example_3": 8}
 
 
-def section_2(tell: Tell) -> Outcome:
+def section_2(tell: Tell) -> Iterator[Outcome]:
     """The maps of the examples with and without enrichment, (47) to (51)."""
-    outcomes = []
     for done, (name, law) in enumerate(EXAMPLES.items()):
         tell(f"section 2: {name.replace('_', ' ')}", done, len(EXAMPLES))
-        outcomes.append(_example(name, law))
-    return joined(*outcomes)
+        yield _example(name, law)
 
 
 def _example(name: str, law: Callable) -> Outcome:
@@ -91,12 +89,12 @@ def _line_rows(case: str, lines: tuple[Discontinuity, ...], name: str) -> list[R
     return rows
 
 
-def section_3(tell: Tell) -> Outcome:
+def section_3(tell: Tell) -> Iterator[Outcome]:
     """What can be counted in the theory of kriging, and what is amiss in its equations."""
     tell("section 3", 0, 1)
     quadratic, cubic = PolynomialTrend(2), PolynomialTrend(3)
     case = "Kriging, equations 52 to 69"
-    return Outcome(
+    yield Outcome(
         (
             Row(case, "p of a quadratic trend, l = 3", "", "10", len(quadratic.exponents(3)), 10, "(53)"),
             Row(case, "p of a quadratic trend, l = 2", "", "10", len(quadratic.exponents(2)), 6,

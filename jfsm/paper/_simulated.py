@@ -5,7 +5,7 @@ every sample, so these readings lie on the true map to rounding, however well th
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import equinox as eqx
@@ -16,6 +16,7 @@ from jaxtyping import Array, Float
 from scipy.linalg import eigh
 
 from ..dynamics import lower, simulate
+from ..estimation import Motion, estimate_motion
 from ..records import Record
 from ..structures import Structure
 from ..surrogates import AbstractForceStateMap
@@ -58,6 +59,11 @@ class Run:
         """(n,) whether the first mass moves: where dry friction holds it, its force is any."""
         return self.states[:, self.structure.dof] != 0.0
 
+    @cached_property
+    def motion(self) -> Motion:
+        """The motion as it is estimated from all channels."""
+        return estimate_motion(self.record)
+
     def noisy(self, level: float, rng: np.random.Generator) -> "Run":
         """The same run with white noise on every channel, `level` of its largest value each, as in section 5."""
         noisy: dict[str, Any] = {}
@@ -91,6 +97,12 @@ def oscillator(structure: Structure | str, seed: int = 0, duration: float = 15.0
     """
     time = _clock(duration, 80, 3.0)
     return _run(structure, time, multisine(time, 2.4, np.random.default_rng(seed))[:, None])
+
+
+@cache
+def noisy_oscillator(name: str, seed: int, level: float) -> Run:
+    """An oscillator of `jfsm.systems` with noise on every channel, the same in every section that asks for it."""
+    return oscillator(name, seed).noisy(level, np.random.default_rng([seed, round(1e6 * level)]))
 
 
 def driven_frame() -> Run:

@@ -1,7 +1,7 @@
 """The sections of the paper that are repeated, and what came out of them."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,16 +12,16 @@ from ._examples import section_2, section_3
 from ._figures import save_drawing
 from ._kriging import section_5
 from ._noise import section_noise
-from ._rows import Outcome, Tell
+from ._rows import Outcome, Tell, joined
 
-SECTIONS: dict[str, Callable[[Tell], Outcome]] = {
+SECTIONS: dict[str, Callable[[Tell], Iterator[Outcome]]] = {
     "2": section_2,
     "3": section_3,
     "4": section_4,
     "5": section_5,
     "noise": section_noise,
 }
-"""What can be asked for, in the order of the paper."""
+"""What can be asked for, in the order of the paper; each yields its tables one by one."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,11 @@ class Study:
         return written
 
 
-def study(sections: Sequence[str] | None = None, progress: Tell = lambda what, done, total: None) -> Study:
+def study(
+    sections: Sequence[str] | None = None,
+    progress: Tell = lambda what, done, total: None,
+    found: Callable[["Study", "Study"], None] = lambda part, so_far: None,
+) -> Study:
     """Repeat the paper's study.
 
     Parameters
@@ -68,6 +72,8 @@ def study(sections: Sequence[str] | None = None, progress: Tell = lambda what, d
         Names in `SECTIONS`; all when None.
     progress : function, optional
         Called with what is done, steps done and steps in all of the section.
+    found : function, optional
+        Called with every part as soon as it is done, and with all that is done so far.
 
     Raises
     ------
@@ -79,4 +85,10 @@ def study(sections: Sequence[str] | None = None, progress: Tell = lambda what, d
     for name in wanted:
         if name not in SECTIONS:
             raise ValueError(f"`sections` must be among {', '.join(SECTIONS)}; one is {name!r}.")
-    return Study({name: run(progress) for name, run in SECTIONS.items() if name in wanted})
+    so_far = Study({})
+    for name, run in SECTIONS.items():
+        for part in run(progress) if name in wanted else ():
+            before = so_far.sections.get(name, Outcome())
+            so_far = Study({**so_far.sections, name: joined(before, part)})
+            found(Study({name: part}), so_far)
+    return so_far

@@ -11,6 +11,9 @@ from ._page import render_page as render_page
 from ._page_again import render_json as render_json
 from ._pictures import pictures as pictures
 from ._pictures import plot_diagnosis as plot_diagnosis
+from ._progress import bar as bar
+from ._progress import shown_by_default as shown_by_default
+from ._progress import stages as stages
 from ._sketch import Picture as Picture
 from ._text import diagnosis_text as diagnosis_text
 from ._text import inspection_text as inspection_text

@@ -43,7 +43,7 @@ PROPER = {
 
 
 def checked_verdict(d: Mapping[str, Any]) -> Verdict:
-    """The verdict of a diagnosis.
+    """The verdict of a diagnosis, and whether that is the best so far of one that was not finished.
 
     Raises
     ------
@@ -56,7 +56,8 @@ def checked_verdict(d: Mapping[str, Any]) -> Verdict:
             f"`d` must be the dictionary that `Diagnosis.to_json` writes, with 'verdict' one of {', '.join(VERDICTS)}; "
             f"its 'verdict' was {found!r}. Load the file with `json.load` and pass it whole."
         )
-    return VERDICTS[found]
+    verdict = VERDICTS[found]
+    return verdict if d.get("finished", True) else Verdict(f"{verdict.label}, not finished", "open", verdict.meaning)
 
 
 def cause_name(cause: str) -> str:
