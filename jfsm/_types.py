@@ -62,6 +62,35 @@ def as_array(value: Any, name: str, ndim: int | tuple[int, ...]) -> np.ndarray:
     return array
 
 
+def as_numbers(value: Any, name: str, ndim: int | tuple[int, ...]) -> Any:
+    """As `as_array`; numbers that are traced stay so, and are held to their axes only."""
+    if not is_traced(value):
+        return as_array(value, name, ndim)
+    require_x64()
+    array = jnp.asarray(value, dtype=jnp.float64)
+    allowed = (ndim,) if isinstance(ndim, int) else ndim
+    if array.ndim not in allowed:
+        raise ValueError(f"`{name}` must have {' or '.join(map(str, allowed))} axes; got shape {array.shape}.")
+    return array
+
+
+def known(tree: Any, what: str) -> Any:
+    """The tree with the values that are being differentiated as they are now, for decisions on the host.
+
+    Raises
+    ------
+    TypeError
+        If `jax.jit` or `jax.vmap` keeps some value from being known.
+    """
+    values = jax.tree.map(lambda leaf: jax.lax.stop_gradient(leaf) if isinstance(leaf, Tracer) else leaf, tree)
+    if is_traced(values):
+        raise TypeError(
+            f"{what} must be known numbers, which `jax.jit` and `jax.vmap` hide: steps and start are chosen by them. "
+            "Call outside of both; `jax.grad`, `jax.jvp`, `jax.jacfwd` and `jax.jacrev` may be taken of the call."
+        )
+    return values
+
+
 def is_traced(tree: Any) -> bool:
     """Whether any array of a tree is traced."""
     return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(tree))

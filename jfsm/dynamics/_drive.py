@@ -1,9 +1,11 @@
 """The force between its samples."""
 
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+
+from .._types import is_traced
 
 Reconstruction = Literal["band-limited", "linear", "hold"]
 
@@ -13,10 +15,10 @@ _KAISER_BETA = 14.0
 """Stop band near -140 dB, clean up to 0.43 of the sample rate: what the window leaves out drives nothing."""
 
 
-def reconstruct(
-    samples: Float[np.ndarray, "n dof"], factor: int, method: Reconstruction = "band-limited"
-) -> Float[np.ndarray, "fine dof"]:
-    """Values at `factor` equal steps per sample, ``(n - 1) * factor + 1`` in all.
+def reconstruct(samples: Any, factor: int, method: Reconstruction = "band-limited") -> Any:
+    """Values at `factor` equal steps per sample, ``(n - 1) * factor + 1`` in all, from samples (n, dof).
+
+    Traced samples give traced values.
 
     ``"band-limited"`` is the rule for a force that was filtered before it was sampled: a Kaiser-windowed sinc, odd
     reflection at both ends. ``"linear"`` and ``"hold"`` (each sample kept until the next) are for forces known to be
@@ -25,31 +27,33 @@ def reconstruct(
     """
     if method not in get_args(Reconstruction):
         raise ValueError(f'`reconstruction` must be "band-limited", "linear" or "hold"; got {method!r}.')
-    n = samples.shape[0]
+    n, xp = samples.shape[0], jnp if is_traced(samples) else np
     if factor == 1:
-        return samples.copy()
+        return xp.array(samples)
     if method == "hold":
-        return np.repeat(samples, factor, axis=0)[: (n - 1) * factor + 1]
-    fine = np.empty(((n - 1) * factor + 1, samples.shape[1]))
-    fine[::factor] = samples
+        return xp.repeat(samples, factor, axis=0)[: (n - 1) * factor + 1]
     if method == "linear":
-        for phase in range(1, factor):
-            fine[phase::factor] = samples[:-1] + (samples[1:] - samples[:-1]) * phase / factor
-        return fine
-    width = min(_HALF_WIDTH, n - 1)
-    head = 2 * samples[0] - samples[width:0:-1]
-    tail = 2 * samples[-1] - samples[-2 : -width - 2 : -1]
-    padded = np.concatenate([head, samples, tail])
-    offsets = np.arange(-width + 1, width + 1)
-    for phase in range(1, factor):
-        distance = phase / factor - offsets
-        taps = (
-            np.sinc(distance)
-            * np.i0(_KAISER_BETA * np.sqrt(np.maximum(0.0, 1 - (distance / width) ** 2)))
-            / np.i0(_KAISER_BETA)
-        )
-        taps /= taps.sum()  # a constant force stays what it is
-        for j in range(samples.shape[1]):
-            # offset o multiplies sample k + o
-            fine[phase::factor, j] = np.convolve(padded[:, j], taps[::-1], mode="valid")[1:n]
-    return fine
+        shares = np.arange(factor)[None, :, None] / factor
+        inner = samples[:-1, None] + (samples[1:] - samples[:-1])[:, None] * shares
+    else:
+        width = min(_HALF_WIDTH, n - 1)
+        head = 2 * samples[:1] - samples[width:0:-1]
+        tail = 2 * samples[-1:] - samples[-2 : -width - 2 : -1]
+        padded = xp.concatenate([head, samples, tail])
+        phases = [_between(padded, phase / factor, width, n) for phase in range(1, factor)]
+        inner = xp.stack([samples[:-1], *phases], 1)
+    return xp.concatenate([inner.reshape((n - 1) * factor, -1), samples[-1:]])
+
+
+def _between(padded: Any, share: float, width: int, n: int) -> Any:
+    """Band-limited values (n - 1, dof) a share of a step after each sample but the last."""
+    distance = share - np.arange(-width + 1, width + 1)  # offset o multiplies sample k + o
+    taps = (
+        np.sinc(distance)
+        * np.i0(_KAISER_BETA * np.sqrt(np.maximum(0.0, 1 - (distance / width) ** 2)))
+        / np.i0(_KAISER_BETA)
+    )
+    taps /= taps.sum()  # a constant force stays what it is
+    xp = jnp if is_traced(padded) else np
+    columns = [xp.convolve(padded[:, j], taps[::-1], mode="valid")[1:n] for j in range(padded.shape[1])]
+    return xp.stack(columns, 1)

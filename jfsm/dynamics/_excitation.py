@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
+from .._types import is_traced
 from ..records import Record, declipped, silent_forces
 from ..structures import Clipping, LinearDamping, LinearStiffness, Structure
 from ._drive import Reconstruction, reconstruct
@@ -174,26 +175,27 @@ def excitation(
     method: Reconstruction = "band-limited",
     *,
     length: int | None = None,
-    force: np.ndarray | None = None,
+    force: Any = None,
     base: np.ndarray | None = None,
 ) -> Fine:
     """Drive of a record on half steps, padded to `length` samples with its last value, which a late sensor asks for.
 
-    `force` (n, dof) and `base` (n,) replace the record's own samples where they were smoothed or restored beforehand.
+    `force` (n, dof) and `base` (n,) replace the record's own samples where they were smoothed or restored beforehand;
+    the force may be traced.
     """
     samples = measured_force(record, dof) if force is None else force
     if base is None:
         base = np.zeros(len(record)) if record.base_acceleration is None else record.base_acceleration
     n, factor = len(record), 2 * substeps
     padded = n if length is None else length
-    both = np.column_stack([samples, base])
-    intervals = np.zeros((padded, factor + 1, dof + 1))
+    xp = jnp if is_traced(samples) else np
+    both = xp.column_stack([samples, base])
     if method == "hold":  # up to the end of its interval: the jump belongs to the next
-        intervals[:n] = both[:, None]
-        intervals[n:] = both[-1]
+        known = xp.broadcast_to(both[:, None], (n, factor + 1, dof + 1))
     else:
         take = np.arange(n - 1)[:, None] * factor + np.arange(factor + 1)
-        intervals[: n - 1] = reconstruct(both, factor, method)[take]
-        intervals[n - 1 :] = both[-1]  # leads to no sample
+        known = reconstruct(both, factor, method)[take]
+    ahead = xp.broadcast_to(both[-1], (padded - len(known), factor + 1, dof + 1))  # the last leads to no sample
+    intervals = xp.concatenate([known, ahead])
     time = record.time[0] + record.dt * np.arange(padded)
     return Fine(intervals[..., :dof], intervals[..., dof], time, np.asarray(record.dt))

@@ -1,12 +1,14 @@
 """Free runs on the sample grid, many parameter sets at once."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from .._types import is_traced
 from ._forces import hidden_start
 from ._plant import Plant
 from ._stepper import Load, Motion, acceleration, advance, inverse_mass, mode_at
@@ -27,6 +29,21 @@ class Fine(eqx.Module):
     @property
     def substeps(self) -> int:
         return (self.force.shape[1] - 1) // 2
+
+    def by_steps(self, stride: int = 1, length: int | None = None) -> "Fine":
+        """The same drive with every `stride` steps a sample of one step, padded to `length` of these."""
+        n, count = self.force.shape[0], self.substeps // stride
+        nodes = 2 * stride * np.arange(count)[:, None] + stride * np.arange(3)[None, :]
+        given: Any = (self.force, self.base, self.time[0], self.step)
+        force, base, begin, step = given if is_traced(given) else map(np.asarray, given)
+        step = step / count
+        force, base = force[:, nodes].reshape(n * count, 3, -1), base[:, nodes].reshape(n * count, 3)
+        more = (0 if length is None else length) - n * count
+        if more > 0:
+            xp = jnp if is_traced(force) else np
+            force, base = (xp.concatenate([q, xp.broadcast_to(q[-1:], (more, *q.shape[1:]))]) for q in (force, base))
+        time = begin + step * np.arange(n * count + max(more, 0))
+        return Fine(jnp.asarray(force), jnp.asarray(base), jnp.asarray(time), jnp.asarray(step))
 
     def head(self, n: int) -> "Fine":
         """What drives the first `n` samples."""
@@ -217,8 +234,42 @@ def run_grid(plant: Plant, fine: Fine, x0: Float[Array, " dof"], v0: Float[Array
     return free_run(plant, fine, x0, v0)
 
 
-def free_run(plant: Plant, fine: Fine, x0, v0):
-    """As `run_grid`, to be traced."""
+@eqx.filter_jit
+def run_strided(plant: Plant, fine: Fine, stride, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
+    """As `run_grid`, in steps `stride` times as long; the same program whatever the stride.
+
+    Nothing may answer the past.
+    """
+    minv = inverse_mass(plant)
+    fine = punctual(plant, fine)
+    h = fine.step / fine.substeps * stride
+
+    def body(motion, inputs):
+        force, base, time = inputs
+        g = true_force(plant, force, base)
+        a = acceleration(plant, minv, motion.x, motion.v, motion.z, motion.mode, g[0], time)[0]
+
+        def step(i, motion):
+            at = [stride * (2 * i + k) for k in range(3)]
+            forces, bases = (
+                jnp.stack([jax.lax.dynamic_index_in_dim(q, j, keepdims=False) for j in at]) for q in (g, base)
+            )
+            return advance(plant, minv, motion, Load(forces, bases, time + i * h, h))
+
+        return jax.lax.fori_loop(0, fine.substeps // stride, step, motion), (motion.x, motion.v, a)
+
+    motion, _ = begin(plant, minv, x0, v0, fine)
+    return jax.lax.scan(body, motion, (fine.force, fine.base, fine.time))[1]
+
+
+@eqx.filter_jit
+def run_again(plant: Plant, fine: Fine, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
+    """As `run_grid`, for derivatives backwards: the inside of a step is gone through again and not kept."""
+    return free_run(plant, fine, x0, v0, again=True)
+
+
+def free_run(plant: Plant, fine: Fine, x0, v0, again: bool = False):
+    """As `run_grid`, to be traced; as `run_again` if so asked."""
     minv = inverse_mass(plant)
     fine = punctual(plant, fine)
 
@@ -231,4 +282,5 @@ def free_run(plant: Plant, fine: Fine, x0, v0):
         return (after, remember(past, motion.x, motion.v)), (motion.x, motion.v, a)
 
     start = begin(plant, minv, x0, v0, fine)
-    return jax.lax.scan(body, start, (fine.force, fine.base, fine.time))[1]
+    steps = jax.checkpoint(body) if again else body
+    return jax.lax.scan(steps, start, (fine.force, fine.base, fine.time))[1]

@@ -26,7 +26,7 @@ from ._excitation import (
 )
 from ._grid import Fine, free_run
 from ._linearise import state_matrix
-from ._plant import Grid, Plant, Slots, lower
+from ._plant import Grid, Plant, alone, lower
 from ._simulate import check_pair, escapes, finer, motion_bound, with_tables
 
 _LANES = (1, 8, 64)
@@ -183,18 +183,7 @@ def _lowered(structures: Sequence[Structure], grid: Grid) -> Plant:
     masses = np.array([np.asarray(structure.mass) for structure in structures])
     mass = jnp.asarray(masses[:, :, None] * np.eye(masses.shape[1]) if masses.ndim == 2 else masses)
     reach = grid.reach([term for structure in structures for term in structure.terms if term.delay is not None])
-    alone = {name: _alone(getattr(plants, name)) for name in ("smooth", "friction", "memory", "delayed")}
-    return replace(plants, mass=mass, reach=reach, **alone)
-
-
-def _alone(slots: Slots) -> Slots:
-    """The same slots with the laws that stand in them for a table: a program of its own, and many times faster."""
-    kinds = slots.kind.tolist()
-    present = list(dict.fromkeys(kinds))
-    if not present:
-        return slots
-    kind = jnp.asarray([present.index(k) for k in kinds], dtype=slots.kind.dtype)
-    return replace(slots, kind=kind, laws=tuple(slots.laws[k] for k in present))
+    return alone(replace(plants, mass=mass, reach=reach))
 
 
 def _fastest(structures: Sequence[Structure], record: Record) -> list[Structure]:

@@ -6,6 +6,7 @@ which law of the table stands in a slot, by its place, sign or values: those are
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -14,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from .._types import is_traced, known
 from ..structures import (
     DELAYED_TERMS,
     FRICTION_TERMS,
@@ -57,7 +59,7 @@ class Grid(NamedTuple):
 
     def reach(self, delayed: Sequence[Any]) -> int:
         """Samples that the past must reach back for these terms, a power of two."""
-        longest = max((float(term.delay) for term in delayed), default=0.0)
+        longest = max((float(known(term.delay, "Delays")) for term in delayed), default=0.0)
         return max(_REACH, 2 ** math.ceil(math.log2(longest / self.dt + 3)))
 
 
@@ -86,6 +88,15 @@ class Slots(eqx.Module):
         if len(branches) == 1:
             return branches[0](self.parameters[slot])
         return jax.lax.switch(self.kind[slot], branches, self.parameters[slot])
+
+    def alone(self) -> "Slots":
+        """The same slots with the laws that stand in them for a table: a program of its own, and many times faster."""
+        kinds = self.kind.tolist()
+        present = list(dict.fromkeys(kinds))
+        if not present:
+            return self
+        kind = jnp.asarray([present.index(k) for k in kinds], dtype=self.kind.dtype)
+        return replace(self, kind=kind, laws=tuple(self.laws[k] for k in present))
 
     def motion(self, slot: int, x: Float[Array, " dof"], v: Float[Array, " dof"]) -> tuple[Any, Any]:
         """Relative displacement and velocity of a slot's link."""
@@ -172,6 +183,12 @@ def hidden_width(memory: Slots) -> int:
     return max(HIDDEN_STATES, *(law.states for law in memory.laws))
 
 
+def alone(plant: Plant) -> Plant:
+    """The plant with tables of the laws that it has, and no others."""
+    classes = ("smooth", "friction", "memory", "delayed")
+    return replace(plant, **{name: getattr(plant, name).alone() for name in classes})
+
+
 def lower(structure: Structure, channels: Sequence[Channel] = (), **how: Any) -> Plant:
     """Plant of a structure, on the device; see `numbers_of`."""
     arrays, rest = eqx.partition(numbers_of(structure, channels, **how), lambda leaf: isinstance(leaf, np.ndarray))
@@ -186,7 +203,7 @@ def numbers_of(
     grid: Grid | None = None,
     rolled: bool = False,
 ) -> Plant:
-    """Plant of a structure, its arrays those of NumPy.
+    """Plant of a structure, its arrays those of NumPy; numbers that are traced make theirs traced.
 
     Parameters
     ----------
@@ -201,44 +218,43 @@ def numbers_of(
         Whether the stages of a step are a loop, for a program of derivatives.
     """
     dof = structure.dof
-    mass = np.asarray(structure.mass)
-    matrices = {LinearStiffness: np.zeros((dof, dof)), LinearDamping: np.zeros((dof, dof))}
+    mass = structure.mass if is_traced(structure.mass) else np.asarray(structure.mass)
+    matrices: dict[type, Any] = {LinearStiffness: np.zeros((dof, dof)), LinearDamping: np.zeros((dof, dof))}
     smooth, friction, memory, delayed, maps = [], [], [], [], []
     for term in structure.terms:
         row = direction(term.at, dof)
         if isinstance(term, LinearStiffness | LinearDamping):
-            matrices[type(term)] += float(term.values[0]) * np.outer(row, row)
+            matrices[type(term)] = matrices[type(term)] + _number(term.values[0]) * np.outer(row, row)
         elif isinstance(term, MapTerm):
             maps.append(MapSlot(term.force_map, jnp.asarray(row)))
         elif isinstance(term, AbstractFriction):
             friction.append(term)
         else:
             (memory if term.states else smooth if term.delay is None else delayed).append(term)
-    force_gain, force_offset, force_delay = np.zeros(dof), np.zeros(dof), np.zeros(dof)
-    channel_gain, channel_offset, channel_delay = np.zeros(len(channels)), np.zeros(len(channels)), {}
+    sensed: dict[str, Any] = {name: np.zeros(dof) for name in ("force_gain", "force_offset", "force_delay")}
+    sensed |= {name: np.zeros(len(channels)) for name in ("channel_gain", "channel_offset")}
+    channel_delay = {}
     for sensor in structure.sensors:
         if isinstance(sensor, Clipping):
             continue  # concerns readings, not what is behind them
-        row, place = (force_gain, force_offset, force_delay), sensor.at[1] - 1
+        whose, place = "force", sensor.at[1] - 1
         if sensor.at[0] != "force":
             if sensor.at not in channels:
                 continue
-            row, place = (channel_gain, channel_offset), list(channels).index(sensor.at)
+            whose, place = "channel", list(channels).index(sensor.at)
             if isinstance(sensor, ChannelDelay):
                 channel_delay[place] = channel_delay.get(place, 0.0) + sensor.value
                 continue
         late, shifted = isinstance(sensor, ForceDelay), isinstance(sensor, Offset | AccelerationBias)
-        row[2 if late else 1 if shifted else 0][place] += sensor.value
+        name = f"{whose}_{'delay' if late else 'offset' if shifted else 'gain'}"
+        sensed[name] = _with(sensed[name], place, sensed[name][place] + sensor.value)
     kinds = {type(sensor) for sensor in structure.sensors}
     arrays: dict[str, Any] = {
-        "mass": np.diag(mass) if mass.ndim == 1 else mass,
+        "mass": (jnp if is_traced(mass) else np).diag(mass) if mass.ndim == 1 else mass,
         "damping": matrices[LinearDamping],
         "stiffness": matrices[LinearStiffness],
-        "force_gain": force_gain,
-        "force_offset": force_offset,
-        "channel_gain": channel_gain,
-        "channel_offset": channel_offset,
-        "force_delay": force_delay if ForceDelay in kinds else np.zeros(0),
+        **sensed,
+        "force_delay": sensed["force_delay"] if ForceDelay in kinds else np.zeros(0),
         "channel_delay": np.array(list(channel_delay.values()), dtype=float),
         "late_channel": np.array(list(channel_delay), dtype=int),
     }
@@ -261,8 +277,20 @@ def _slots(terms: list, laws: tuple[type, ...], count: int, dof: int, ramp: floa
     arrays: dict[str, Any] = {"kind": kind, "parameters": parameters, "direction": directions}
     for i, term in enumerate(terms):
         kind[i] = laws.index(type(term))
-        parameters[i, : len(term.values)] = [float(value) for value in term.values]
-        if isinstance(term, StiffnessDrop):
-            parameters[i, len(term.values)] = ramp
+        values = [_number(value) for value in term.values] + [ramp] * isinstance(term, StiffnessDrop)
+        for j, value in enumerate(values):
+            arrays["parameters"] = _with(arrays["parameters"], (i, j), value)
         directions[i] = direction(term.at, dof)
     return Slots(**arrays, laws=laws)
+
+
+def _number(value: Any) -> Any:
+    return value if is_traced(value) else float(value)
+
+
+def _with(array: Any, place: Any, value: Any) -> Any:
+    """The array with one value replaced, in place unless one is traced."""
+    if is_traced((array, value)):
+        return jnp.asarray(array).at[place].set(value)
+    array[place] = value
+    return array

@@ -1,8 +1,8 @@
 """Free runs of a structure, driven by what a record says drove it; the force that a motion needs, where that drove."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Any, Literal, NamedTuple, get_args
 
 import equinox as eqx
 import jax
@@ -11,9 +11,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from .._result import Result
-from .._types import require_x64
+from .._types import as_numbers, is_traced, known, require_x64
 from ..records import Record
 from ..structures import (
+    AbstractFriction,
     AbstractSensor,
     AccelerationBias,
     AccelerationGain,
@@ -26,20 +27,32 @@ from ..structures import (
     Structure,
 )
 from ..surrogates import AbstractForceStateMap, tabulate
+from ._agreement import Agreement, agreement
 from ._drive import Reconstruction
 from ._excitation import bucket, excitation, force_limits, measured_force, substeps_for, typical_size
-from ._grid import Fine, punctual, run_grid, true_force
+from ._grid import Fine, punctual, run_again, run_grid, run_strided, true_force
 from ._imposed import imposed_motion, imposed_substeps
 from ._needed import force_needed
-from ._plant import Grid, Plant, lower, readout
-from ._reference import run_reference
+from ._plant import Grid, Plant, alone, lower, readout
+from ._reference import STEPS_OF_DRIVE, coarser, run_reference
 from ._start import starting_state
 from ._stepper import free_acceleration, inverse_mass
+
+Solver = Literal["reference", "grid"]
 
 _FINER = 4
 """Steps here for each that the likelihood takes: the error of a smooth motion falls with the fourth power."""
 _MOST_FINER = 64
 """Steps per sample up to which they are refined so; beyond, they are doubled only."""
+_GROWTH = 4
+"""How many times as many steps a run takes once more where its error is larger than wanted."""
+_WANTED = 1e-3
+"""Error of a run, in standard deviations of its motion, beyond which it is made once more, more finely."""
+_LOOSER = 100.0
+"""Tolerance of the run that a run with step control is compared with, over its own."""
+_LOOSE_SHARE = 0.1
+"""Error of the tighter run over the difference of both: a hundredth by the tolerance, a 64th by the drive, and room."""
+_TIGHTEST, _LOOSEST = 1e-14, 1e-2
 _BOUND = 1e6
 """A motion this many times larger than anything that was measured or could be driven has escaped."""
 
@@ -64,6 +77,13 @@ class Response:
     force : (n, dof) array or None
         Where the motion is imposed: the force that it needs, offset of its channel included. The motion is then the
         record's own, as reconstructed.
+    error : (dof,) array or None
+        Estimated largest error [m] of the displacement of each degree of freedom, from a second run that was made more
+        coarsely: how far the arrays are from the motion of this structure under this reconstructed force. It says
+        nothing of the model, nor of what the force does between its samples. None where the motion is imposed.
+    agreed_until : float or None
+        Instant [s] up to which both runs agree, to a tenth of the motion's standard deviation. None where they do
+        throughout; else the motion is sensitive, chaotic perhaps, and what follows is one of many motions.
     """
 
     time: np.ndarray
@@ -75,6 +95,22 @@ class Response:
     solver: str
     _sensors: tuple[AbstractSensor, ...]
     force: np.ndarray | None = None
+    error: np.ndarray | None = None
+    agreed_until: float | None = None
+
+    @property
+    def accuracy(self) -> str:
+        """How good the run is, in words."""
+        if self.error is None:
+            return "The motion is imposed; nothing runs free."
+        sizes = ", ".join(f"{error:.2g}" for error in self.error)
+        if self.agreed_until is None:
+            return f"The displacement is good to {sizes} (in its unit, one value per degree of freedom)."
+        return (
+            f"Two runs of different steps agree until t = {self.agreed_until:.6g} s and then part: the motion is "
+            "sensitive to the smallest change, and beyond that instant only its character can be trusted. "
+            "Compare statistics there, or run shorter stretches from measured states."
+        )
 
     def readings(self, record: Record) -> dict[tuple[str, int], np.ndarray]:
         """What the sensors of `record` would show, by channel (kind, degree of freedom): their effects applied.
@@ -103,9 +139,10 @@ def simulate(
     record: Record,
     initial_state: Any = None,
     *,
+    force: Any = None,
     window: int = 50,
     reconstruction: Reconstruction = "band-limited",
-    solver: Literal["reference", "grid"] = "reference",
+    solver: Solver = "reference",
     tolerance: float = 1e-10,
 ) -> Response:
     """Free run of `model` under the force (or base motion) of `record`, or the force that its imposed motion needs.
@@ -124,16 +161,19 @@ def simulate(
     initial_state : pair of (dof,) arrays, optional
         Displacement and velocity at the first sample. Without it: rest if the record says so; else least squares of
         the structure over the first `window` samples of whatever response there is; else rest.
+    force : (n,) or (n, dof) array, optional
+        Samples that drive in place of the record's; a single column acts on the first degree of freedom.
     window : int
     reconstruction : "band-limited", "linear" or "hold"
         The force between its samples.
     solver : "reference" or "grid"
         ``"reference"``: Tsitouras' 5(4) with step control at `tolerance` where nothing sticks or answers the past.
         ``"grid"``: fixed Runge-Kutta steps with located reversals, of the kind that the likelihood takes but four times
-        as many; always where something sticks or answers the past.
+        as many; always where something sticks or answers the past. Where two runs differ by more than a thousandth of
+        the motion, either is made once more, with a hundredth of the tolerance or four times the steps.
     tolerance : float
         Relative, per step, of the motion's size. Over a hundred periods the errors of the steps add up to a thousand
-        times as much.
+        times as much; `Response.error` estimates what they come to.
 
     Returns
     -------
@@ -142,11 +182,20 @@ def simulate(
     Raises
     ------
     ValueError
-        If the record names a degree of freedom that the structure lacks, its time is uneven, a mass is zero, or
-        `initial_state` has the wrong shape; or, where the motion is imposed, it is not measured at a degree of freedom,
-        or an initial state is given.
+        If the record names a degree of freedom that the structure lacks, its time is uneven, a mass is zero,
+        `initial_state` or `force` has the wrong shape, or there is no such solver or tolerance; or, where the motion is
+        imposed, it is not measured at a degree of freedom, or an initial state or a force is given.
+    TypeError
+        If `jax.jit` or `jax.vmap` hides the numbers by which steps are chosen, or a map's are to be differentiated.
+
+    Notes
+    -----
+    `jax.grad`, `jax.jvp`, `jax.jacfwd` and `jax.jacrev` may be taken of a call: by the numbers of the structure, by
+    `force` and by `initial_state`. The motion then comes from the grid, as JAX arrays, in steps chosen for the numbers
+    as they are, and the derivative is exactly that of this run. The start must be known: given, or at rest.
     """
     require_x64()
+    check_scheme(solver, tolerance)
     check_pair(model, record, imposed=True)
     model = with_tables(model)
     if record.drive == "motion":
@@ -154,45 +203,190 @@ def simulate(
             raise ValueError(
                 '`initial_state` must be left out where the record has drive="motion": its motion is known throughout.'
             )
+        if force is not None:
+            raise ValueError('`force` must be left out where the record has drive="motion": it is what is looked for.')
         return _imposed_response(model, record)
-    channels = tuple(record.responses)
-    exact = lower(model, channels)
-    fixed = bool(len(exact.friction) or len(exact.delayed))  # what sticks or answers the past has a scheme of its own
+    if is_traced((model, force, initial_state)):
+        return _traced_response(model, record, initial_state, force, reconstruction)
+    samples = _force_samples(model, record, force)
+    start = starting_state(model, record, initial_state, window=window, reconstruction=reconstruction)
+    run = _free_run(model, record, samples, start, reconstruction, solver, tolerance)
+    return _response(model, record, run)
+
+
+def _traced_response(model: Structure, record: Record, initial_state: Any, force: Any, reconstruction) -> Response:
+    """A run whose derivatives are asked for: on the grid, in steps that were chosen for the numbers as they are."""
+    if initial_state is None and record.responses and not record.at_rest:
+        raise ValueError(
+            "`initial_state` must be given where derivatives are asked for, or the record be made with `at_rest=True`; "
+            "it was left out, and a start that is fitted to the response would move with the model unseen."
+        )
+    what = "The numbers of `model`, `force` and `initial_state`"
+    model_now, force_now, state_now = known(model, what), known(force, what), known(initial_state, what)
+    now = starting_state(model_now, record, state_now)
+    samples = _force_samples(model_now, record, force_now)
+    chosen = _free_run(model_now, record, samples, now, reconstruction, "grid", 1.0)
+    plant = alone(lower(model, grid=_steps_of(record.dt, chosen.substeps), rolled=True))
+    every = chosen.substeps if len(plant.delayed) else 1
+    if force is not None:
+        samples = _by_dof(force, record, model.dof)
+    fine = excitation(record, model.dof, chosen.substeps, reconstruction, length=bucket(len(record)), force=samples)
+    start = now if initial_state is None else tuple(jnp.atleast_1d(jnp.asarray(q, dtype=float)) for q in initial_state)
+    x, v, a = run_again(plant, fine.by_steps() if every > 1 else fine, *(jnp.asarray(q) for q in start))
+    shown = slice(0, len(record) * every, every)
+    return _response(model, record, chosen._replace(motion=(x[shown], v[shown], a[shown])))
+
+
+class _Run(NamedTuple):
+    """Displacement, velocity and relative acceleration (n, dof) of a free run, where it ended, and how good it is."""
+
+    motion: tuple[Any, Any, Any]
+    stop: int | None
+    solver: str
+    substeps: int
+    agreement: Agreement
+
+
+def _free_run(
+    model: Structure, record: Record, force: np.ndarray, start: tuple, reconstruction, solver: str, tolerance: float
+) -> _Run:
+    """The run of a structure with known numbers from a known start, under samples of the force (n, dof)."""
+    sticks = any(isinstance(t, AbstractFriction) for t in model.terms)
+    own_scheme = sticks or any(t.delay is not None for t in model.terms)
+
+    def drive(substeps: int) -> Fine:
+        return excitation(record, model.dof, substeps, reconstruction, length=bucket(len(record)), force=force)
+
     substeps = finer(substeps_for(model, record.dt, typical_size(record)))
-    force = measured_force(record, model.dof, force_limits(model))
-    fine = excitation(record, model.dof, substeps, reconstruction, length=bucket(len(record)), force=force)
-    x0, v0 = starting_state(model, record, initial_state, window=window, reconstruction=reconstruction)
     # The grid run is cheap, and tells where an unstable motion leaves, before any step control meets it.
-    start = jnp.asarray(x0), jnp.asarray(v0)
-    # What answers the past remembers the motion once per sample of the drive, so here every step is one.
-    every = substeps if len(exact.delayed) and solver == "reference" else 1
-    plant = lower(model, channels, grid=Grid(record.dt / every, substeps // every))
-    run = run_grid(plant, _by_steps(fine) if every > 1 else fine, *start)
-    x, v, a = (np.asarray(q)[::every][: len(record)] for q in run)
-    escape = int(escapes(motion_bound(plant, fine, record, x0, x), x, v))
-    stop, used = (escape if escape < len(record) else None), "grid"
-    if stop is None and solver == "reference" and not fixed:
-        scale = jnp.maximum(jnp.std(jnp.asarray(x)), 1e-30)
-        run = run_reference(exact, fine, *start, jnp.asarray(tolerance, dtype=jnp.float64), scale)
-        if bool(run[-1]):
-            used = "reference"
-            a = np.asarray(_accelerations(exact, fine, *run[:-1]))[: len(record)]
-            x, v = (np.asarray(q)[: len(record)] for q in run[:2])
-    n = len(record) if stop is None else stop
+    better = _grid_run(model, record, drive(substeps), start)
+    if better.stop is None and solver == "reference" and not own_scheme:
+        fine = drive(max(substeps, STEPS_OF_DRIVE))
+        found = _controlled_run(model, record, fine, start, better, tolerance)
+        if found is not None:
+            return found._replace(substeps=substeps)
+    coarse = _grid_run(model, record, drive(substeps), start, stride=2)
+    run, ratio = _judged(better, coarse, 2), min(_GROWTH, _MOST_FINER // substeps)
+    if ratio > 1 and not run.agreement.within(_WANTED, run.motion[0][: run.stop], better.usual):
+        finest = _grid_run(model, record, drive(ratio * substeps), start)
+        run = _judged(finest, better, ratio)
+    return run
+
+
+class _GridRun(NamedTuple):
+    motion: tuple[np.ndarray, np.ndarray, np.ndarray]
+    stop: int | None
+    substeps: int
+    usual: float
+    """Displacement [m] that is usual for what drives."""
+
+
+def _grid_run(model: Structure, record: Record, fine: Fine, start: tuple, stride: int = 1) -> _GridRun:
+    """A run in fixed steps, or in those `stride` times as long: both by one program."""
+    plant, n, every = lower(model, grid=Grid(record.dt, fine.substeps // stride)), len(record), 1
+    begin = tuple(jnp.asarray(q) for q in start)
+    if len(plant.delayed):
+        # What answers the past remembers the motion once per sample of the drive, so here every step is one.
+        every, length = fine.substeps // stride, fine.force.shape[0] * fine.substeps
+        reach = lower(model, grid=_steps_of(record.dt, fine.substeps)).reach
+        motion = run_grid(replace(plant, reach=reach), fine.by_steps(stride, length), *begin)
+    else:
+        motion = run_strided(plant, fine, jnp.asarray(stride), *begin)
+    x, v, a = (np.asarray(q)[: n * every : every] for q in motion)
+    bound = motion_bound(plant, fine, record, np.asarray(start[0]), x)
+    escape = int(escapes(bound, x, v))
+    return _GridRun((x, v, a), escape if escape < n else None, fine.substeps // stride, float(bound) / _BOUND)
+
+
+def _judged(run: _GridRun, coarse: _GridRun, ratio: int) -> _Run:
+    """A run on the grid with its error, from one whose steps were `ratio` times as long."""
+    # The method is of order four where the motion is smooth. Kinks that no step knows of cost it two orders, and what
+    # is left varies from one to the next: as much is allowed for as a method of order one would need.
+    share = 1.0 / (ratio - 1)
+    found = agreement(run.motion[0][: run.stop], coarse.motion[0][: run.stop], share, run.usual)
+    return _Run(run.motion, run.stop, "grid", run.substeps, found)
+
+
+def _controlled_run(
+    model: Structure, record: Record, fine: Fine, start: tuple, on_grid: _GridRun, tolerance: float
+) -> _Run | None:
+    """A run with step control, sharpened once where it is not good enough; None if step control did not get through."""
+    exact, n = lower(model), len(record)
+    scale = jnp.maximum(jnp.std(jnp.asarray(on_grid.motion[0])), 1e-30)
+    (x0, v0), coarse, found = (jnp.asarray(q) for q in start), coarser(fine), None
+    for tight in (tolerance, max(tolerance / _LOOSER, _TIGHTEST)):
+        run = run_reference(exact, fine, x0, v0, jnp.asarray(tight), scale)
+        loose = run_reference(exact, coarse, x0, v0, jnp.asarray(min(tight * _LOOSER, 0.1)), scale)
+        if not bool(run[-1]):
+            break
+        x, v = (np.asarray(q)[:n] for q in run[:2])
+        a = np.asarray(_accelerations(exact, fine, *run[:-1]))[:n]
+        near = agreement(x, np.asarray(loose[0])[:n], _LOOSE_SHARE, on_grid.usual)
+        found = _Run((x, v, a), None, "reference", on_grid.substeps, near)
+        if near.within(_WANTED, x, on_grid.usual):
+            break
+    return found
+
+
+def _response(model: Structure, record: Record, run: _Run) -> Response:
+    """What a run shows: in the record's datum, up to its escape."""
+    n = len(record) if run.stop is None else run.stop
+    x, v, a = run.motion
     if record.base_acceleration is not None:
         a = a + record.base_acceleration[:, None]
     shown = {}
     for kind, values in (("displacement", x), ("velocity", v), ("acceleration", a)):
-        shift = np.array([total(model.sensors, Offset, (kind, j + 1)) for j in range(model.dof)])
-        shown[kind] = values[:n] + shift
+        shift = [total(model.sensors, Offset, (kind, j + 1)) for j in range(model.dof)]
+        row = jnp.stack([jnp.asarray(q) for q in shift]) if is_traced(shift) else np.array(shift)
+        shown[kind] = values[:n] + row[None, :]
+    parted = run.agreement.parted
     return Response(
         time=record.time[:n],
-        result=Result.successful if stop is None else Result.diverged,
-        escape_time=None if stop is None else float(record.time[stop]),
-        solver=used,
+        result=Result.successful if run.stop is None else Result.diverged,
+        escape_time=None if run.stop is None else float(record.time[run.stop]),
+        solver=run.solver,
         _sensors=model.sensors,
+        error=run.agreement.error,
+        agreed_until=None if parted is None else float(record.time[max(parted - 1, 0)]),
         **shown,
     )
+
+
+def _steps_of(dt: float, substeps: int) -> Grid:
+    """The grid of a run whose every step is a sample."""
+    return Grid(dt / substeps, 1)
+
+
+def _force_samples(model: Structure, record: Record, force: Any) -> np.ndarray:
+    """Samples of the force (n, dof): those given, else the record's."""
+    if force is None:
+        return measured_force(record, model.dof, force_limits(model))
+    return _by_dof(force, record, model.dof)
+
+
+def _by_dof(force: Any, record: Record, dof: int) -> Any:
+    """A given force as (n, dof); of one column if it has one, at the first degree of freedom."""
+    samples = as_numbers(force, "force", (1, 2))
+    samples = samples[:, None] if samples.ndim == 1 else samples
+    if samples.shape not in {(len(record), 1), (len(record), dof)}:
+        raise ValueError(
+            f"`force` must have one row per sample of `record` and one column, or one per degree of freedom, "
+            f"({len(record)}, {dof}); got {samples.shape}. Leave it out to take the record's own."
+        )
+    xp = jnp if is_traced(samples) else np
+    return xp.pad(samples, ((0, 0), (0, dof - samples.shape[1])))
+
+
+def check_scheme(solver: Any, tolerance: Any) -> None:
+    """Refuse a solver that there is not, or a tolerance that step control cannot keep."""
+    if solver not in get_args(Solver):
+        raise ValueError(f'`solver` must be "reference" or "grid"; got {solver!r}. Leave it out for "reference".')
+    number = isinstance(tolerance, int | float | np.number) and not isinstance(tolerance, bool)
+    if not number or not _TIGHTEST <= tolerance <= _LOOSEST:
+        raise ValueError(
+            f"`tolerance` must be a number from {_TIGHTEST:g} to {_LOOSEST:g}: the relative error of a step, which "
+            f"rounding bounds below; got {tolerance!r}. Leave it out for 1e-10."
+        )
 
 
 def total(sensors: Sequence[AbstractSensor], effect: type[AbstractSensor], channel: tuple[str, int]) -> float:
@@ -202,6 +396,13 @@ def total(sensors: Sequence[AbstractSensor], effect: type[AbstractSensor], chann
 
 def with_tables(model: Structure) -> Structure:
     """The structure with every map frozen to a table: in every step a map would cost a thousand times more."""
+    maps = [t.force_map for t in model.terms if isinstance(t, MapTerm)]
+    if is_traced([m for m in maps if isinstance(m, AbstractForceStateMap)]):
+        raise TypeError(
+            "`model` must hold maps of known numbers: each is frozen to a table, which has no derivative by them; "
+            "one of a map is traced. Differentiate by the structure's other numbers, or put in a law of your own, "
+            "`MapTerm(function, at=(0, 1))` with an equinox module for a function of the state."
+        )
     terms = [
         tabulate(t.force_map).on(t.at)
         if isinstance(t, MapTerm) and isinstance(t.force_map, AbstractForceStateMap)
@@ -239,7 +440,7 @@ def check_pair(model: Structure, record: Record, *, imposed: bool = False) -> No
             '`record` has drive="motion"; here a force or a moving base must drive. `simulate`, `fit` and `diagnose` '
             'take imposed motions; if the force drives the structure, make the record with drive="force".'
         )
-    masses = np.asarray(model.mass)
+    masses = np.asarray(known(model.mass, "`mass`"))
     if masses.ndim == 1 and np.any(masses == 0):
         raise ValueError(
             f"`mass` must be positive for the structure to move; got {masses.tolist()}. "
@@ -261,19 +462,6 @@ def _accelerations(plant: Plant, fine, x, v, z):
 def finer(substeps: int) -> int:
     """Steps per sample of a run that is to be looked at, from those that the likelihood would take."""
     return max(min(_FINER * substeps, _MOST_FINER), 2 * substeps)
-
-
-def _by_steps(fine: Fine) -> Fine:
-    """The same drive with every step a sample of its own."""
-    n, substeps = fine.force.shape[0], fine.substeps
-    step = fine.step / substeps
-    nodes = 2 * jnp.arange(substeps)[:, None] + jnp.arange(3)[None, :]
-    return Fine(
-        fine.force[:, nodes].reshape(n * substeps, 3, -1),
-        fine.base[:, nodes].reshape(n * substeps, 3),
-        (fine.time[:, None] + step * jnp.arange(substeps)[None, :]).reshape(-1),
-        step,
-    )
 
 
 def motion_bound(plant: Plant, fine: Fine, record: Record, x0: np.ndarray, x: np.ndarray) -> np.ndarray:

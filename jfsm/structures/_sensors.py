@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import equinox as eqx
 
-from .._types import as_scalar
+from .._types import as_scalar, is_traced
 from ._term import ABOVE_ZERO, Parameter, Scalar
 
 CHANNEL_KINDS = ("force", "displacement", "velocity", "acceleration")
@@ -37,9 +37,10 @@ class AbstractSensor(eqx.Module):
         return f"{self.at[0]}-{self.at[1]}"
 
     @property
-    def value(self) -> float:
-        """The effect's one number."""
-        return float(getattr(self, self.parameters[0].name))
+    def value(self) -> Any:
+        """The effect's one number: a float, unless it is being traced."""
+        number = getattr(self, self.parameters[0].name)
+        return number if is_traced(number) else float(number)
 
     def __check_init__(self):
         if self.at[0] not in self.channels or self.at[1] < 1:

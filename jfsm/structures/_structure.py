@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .._types import as_array
+from .._types import as_array, as_numbers, is_traced
 from ._sensors import AbstractSensor
 from ._term import AbstractTerm, Parameter
 from .terms import LinearDamping, LinearStiffness
@@ -49,10 +49,11 @@ class Structure(eqx.Module):
         sensors: Iterable[AbstractSensor] = (),
         trust: Mapping[str, float] | Iterable[tuple[str, float]] = (),
     ):
-        masses = as_array(mass, "mass", (0, 1, 2))
-        masses = np.atleast_1d(masses)
-        _check_mass(masses)
-        self.mass = jnp.asarray(masses)
+        masses = as_numbers(mass, "mass", (0, 1, 2))
+        if not is_traced(masses):
+            masses = np.atleast_1d(masses)
+            _check_mass(masses)
+        self.mass = jnp.atleast_1d(jnp.asarray(masses))
         self.terms = tuple(terms)
         self.sensors = tuple(sensors)
         self.trust = tuple(dict(trust).items())
@@ -81,9 +82,9 @@ class Structure(eqx.Module):
     @classmethod
     def chain(cls, mass: Any, stiffness: Any, damping: Any = None) -> "Structure":
         """Masses in a row; spring and dashpot i join mass i - 1 (ground for the first) to mass i."""
-        masses = as_array(mass, "mass", 1)
-        springs = as_array(stiffness, "stiffness", 1)
-        dashpots = np.zeros_like(springs) if damping is None else as_array(damping, "damping", 1)
+        masses = as_numbers(mass, "mass", 1)
+        springs = as_numbers(stiffness, "stiffness", 1)
+        dashpots = np.zeros(springs.shape) if damping is None else as_numbers(damping, "damping", 1)
         for name, values in (("stiffness", springs), ("damping", dashpots)):
             if values.size != masses.size:
                 raise ValueError(f"`{name}` must have one value per mass ({masses.size}); got {values.size}.")

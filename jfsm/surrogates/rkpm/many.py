@@ -21,7 +21,7 @@ from .estimates import SINGULAR, Neighbourhood, Rule, basis_at, degenerate_messa
 from .interfaces import regions
 from .moments import moment_estimates
 from .nodes import Nodes
-from .support import gathered_nodes
+from .support import gathered_nodes, support_radius
 
 TRUSTED_PIVOT_RATIO = 1e-2
 """Pivot ratio above which Cholesky serves: a cubic is then reproduced to 4e-10 or better, at the corners of
@@ -29,6 +29,9 @@ a two-tone motion with one neighbour to spare; at 1e-3 to 1e-7 only. QR keeps 1e
 
 LARGEST_WORK = 2**21
 """Numbers in flight at once, such as states × neighbours × monomials: 16 MiB, so that a block stays near the cache."""
+
+LARGEST_CHUNK = 2**14
+"""Points × neighbours whose powers are held at once: 128 KiB a power, so that all of them stay in the cache."""
 
 LARGEST_FACTORISED = 256
 """States in one block of factorisations: from 512 on XLA's pool of two threads waits for itself and never ends."""
@@ -95,24 +98,35 @@ def _by_moments(
 ) -> tuple[Float[Array, "q derivatives outputs"], NDArray[np.float64]]:
     """Fast estimates, each with the pivot ratio of its moment matrix."""
     scale, multiplicity = np.asarray(nodes.scale), np.asarray(nodes.multiplicity)
-    force = nodes.force.reshape(len(nodes), -1)
-    estimates, ratios = [np.zeros((0, len(targets.orders), force.shape[1]))], [np.zeros(0)]
+    force, columns = nodes.force.reshape(len(nodes), -1), np.ascontiguousarray(tree.data.T)
+    found = []
     largest = LARGEST_WORK // (rule.neighbours * basis_size(nodes.dim, rule.order))
     for block, length in padded_blocks(states, largest):
-        distance, index = _nearest(tree, block / scale, min(rule.neighbours + 1, len(nodes)))
-        index = index[:, : rule.neighbours]
+        points = block / scale
+        distance, index = _nearest(tree, points, min(rule.neighbours + 1, len(nodes)))
+        index = _in_chunks(index[:, : rule.neighbours])
+        chunks, _, chunk = index.shape
+        here = points.T.reshape(nodes.dim, chunks, 1, chunk)
+        # What a block gives is not looked at before the last: XLA computes one while the tree is searched for the next.
         block_estimates, ratio = moment_estimates(
-            jnp.asarray((block / scale)[:, None, :] - tree.data[index]),
+            [jnp.asarray(x - column[index]) for x, column in zip(here, columns, strict=True)],
             jnp.asarray(multiplicity[index]),
             _take(force, index),
-            jnp.asarray(distance),
+            support_radius(jnp.asarray(distance), rule.neighbours),
             nodes.scale,
             targets,
             rule,
         )
-        estimates.append(_first(block_estimates, length))
-        ratios.append(np.asarray(ratio)[:length])
-    return _joined(estimates), np.concatenate(ratios)
+        found.append((block_estimates, ratio, length))
+    estimates = [np.zeros((0, len(targets.orders), force.shape[1])), *(_first(part, n) for part, _, n in found)]
+    return _joined(estimates), np.concatenate([np.zeros(0), *(np.asarray(ratio)[:n] for _, ratio, n in found)])
+
+
+def _in_chunks(index: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Nodes (points, near) around points as (chunks, near, chunk); points and chunks are counted by powers of two."""
+    points, near = index.shape
+    chunk = min(points, 1 << max(LARGEST_CHUNK // near, 1).bit_length() - 1)
+    return np.ascontiguousarray(index.reshape(points // chunk, chunk, near).transpose(0, 2, 1))
 
 
 def _by_factorisation(

@@ -1,5 +1,7 @@
 """Many points at once: distinct moments and a Cholesky factor written out, with the points in the last axis."""
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
@@ -8,10 +10,10 @@ import jax.numpy as jnp
 from jax.scipy.linalg import cho_solve
 from jaxtyping import Array, Float
 
-from .basis import DerivativeTargets, MultiIndex, monomial_columns, multi_indices
+from .basis import DerivativeTargets, MultiIndex, multi_indices
 from .estimates import Rule
 from .shape_functions import window_weights
-from .support import pivot_ratio, support_radius
+from .support import pivot_ratio
 
 UNROLLED = 10
 """Largest basis whose factor is written out; above, compiling it costs more than LAPACK's batches."""
@@ -23,10 +25,10 @@ Triangle = list[list[Column]]
 
 @eqx.filter_jit
 def moment_estimates(
-    offsets: Float[Array, "points near dim"],
-    multiplicity: Float[Array, "points near"],
-    force: Float[Array, "points near outputs"],
-    distance: Float[Array, "points near_and_next"],
+    offsets: Sequence[Float[Array, "chunks near chunk"]],
+    multiplicity: Float[Array, "chunks near chunk"],
+    force: Float[Array, "chunks near chunk outputs"],
+    support: Float[Array, " points"],
     scale: Float[Array, " dim"],
     targets: DerivativeTargets,
     rule: Rule,
@@ -35,13 +37,14 @@ def moment_estimates(
 
     Parameters
     ----------
-    offsets : (points, near, dim) float array
-        Point minus node, in units of `scale`.
-    multiplicity : (points, near) float array
+    offsets : sequence of (chunks, near, chunk) float arrays, one per axis
+        Point minus node, in units of `scale`. Points come in chunks, those of the first before those of the second; a
+        chunk is small enough for its sums to be formed in the cache.
+    multiplicity : (chunks, near, chunk) float array
         How many readings each node stands for.
-    force : (points, near, outputs) float array
-    distance : (points, near + 1) float array
-        Length of the offsets, rising, and that of the next node, where the support ends; without it if there is none.
+    force : (chunks, near, chunk, outputs) float array
+    support : (points,) float array
+        Distance at which the support ends, in units of `scale`.
     scale : (dim,) float array
         Scale of the offsets per axis, in its unit.
 
@@ -55,21 +58,58 @@ def moment_estimates(
     -----
     M holds far fewer distinct moments Σ w z^(α+β) than entries: 28 for the 10 × 10 of a cubic basis in two dimensions.
     """
-    dim, order = offsets.shape[-1], rule.order
-    dilation = rule.dilation * support_radius(distance, rule.neighbours) / rule.window.radius
-    z = offsets / dilation[:, None, None]
-    weight = window_weights(z, rule.window) * multiplicity
-    powers = multi_indices(dim, 2 * order)
-    columns = monomial_columns([z[..., axis] for axis in range(dim)], 2 * order)
-    moments = {exponents: jnp.sum(weight * column, axis=1) for exponents, column in zip(powers, columns, strict=True)}
-    basis = multi_indices(dim, order)
+    chunks, _, chunk = multiplicity.shape
+    dilation = rule.dilation * support / rule.window.radius
+    inputs = (tuple(offsets), multiplicity, force, dilation.reshape(chunks, chunk))
+    sums = jax.lax.map(lambda each: _sums(each[0], each[1], each[2], each[3], rule), inputs)
+    moments, loads = jax.tree.map(lambda q: q.reshape(-1, *q.shape[2:]), sums)
+    basis = multi_indices(len(offsets), rule.order)
     matrix = [[moments[_plus(alpha, beta)] for beta in basis[: row + 1]] for row, alpha in enumerate(basis)]
     solve = _solve_unrolled if len(basis) <= UNROLLED else _solve_batched
     correction, ratio = solve(matrix, targets.at_origin)
-    loads = [jnp.sum((weight * column)[..., None] * force, axis=1) for column in columns[: len(basis)]]  # Σ H φ u
     estimates = sum(b[..., None] * load[None] for b, load in zip(correction, loads, strict=True))
     unit = jax.vmap(targets.per_unit, out_axes=1)(dilation[:, None] * scale[None, :])
     return jnp.moveaxis(estimates * unit[..., None], 0, 1), ratio
+
+
+def _sums(
+    offsets: Sequence[Float[Array, "near chunk"]],
+    multiplicity: Float[Array, "near chunk"],
+    force: Float[Array, "near chunk outputs"],
+    dilation: Float[Array, " chunk"],
+    rule: Rule,
+) -> tuple[dict[MultiIndex, Float[Array, " chunk"]], list[Float[Array, "chunk outputs"]]]:
+    """Moments Σ w z^α up to twice the order, and loads Σ H w u, of the points of one chunk."""
+    # The sums run over the first axis, points side by side. Without the barriers XLA would form window, quotients and
+    # powers anew in each of the many sums.
+    z = [axis / dilation[None, :] for axis in offsets]
+    weight = window_weights(jnp.stack(z, axis=-1), rule.window) * multiplicity
+    first, *others = [_powers(axis, 2 * rule.order) for axis in _kept(z)]
+    weighted = [weight, *_kept([weight * power for power in first[1:]])]
+
+    def total(values: list[Array], alpha: MultiIndex) -> Array:
+        factors = [powers[e] for powers, e in zip(others, alpha[1:], strict=True) if e]
+        return jnp.sum(math.prod(factors, start=values[alpha[0]]), axis=0)
+
+    moments = {alpha: total(weighted, alpha) for alpha in multi_indices(len(z), 2 * rule.order)}
+    loads = []
+    for output in range(force.shape[-1]):
+        driven = _kept([w * force[..., output] for w in weighted[: rule.order + 1]])
+        loads.append([total(driven, alpha) for alpha in multi_indices(len(z), rule.order)])
+    return moments, [jnp.stack(of_outputs, axis=-1) for of_outputs in zip(*loads, strict=True)]
+
+
+def _powers(base: Array, highest: int) -> list[Array]:
+    """Powers of one coordinate, from the zeroth."""
+    powers = [jnp.ones_like(base), base]
+    while len(powers) <= highest:
+        powers += _kept([powers[-1] * base])
+    return powers
+
+
+def _kept(values: list[Array]) -> list[Array]:
+    """The same values, formed once."""
+    return list(jax.lax.optimization_barrier(tuple(values)))
 
 
 def _plus(a: MultiIndex, b: MultiIndex) -> MultiIndex:
