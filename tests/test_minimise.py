@@ -1,5 +1,7 @@
 """Least values within bounds: where a search ends, what it refuses, and how seldom it is compiled."""
 
+from typing import Any
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ from jfsm.surrogates import _minimise
 from jfsm.surrogates._minimise import minimise_within
 
 LOWER, UPPER = np.array([-2.0, -2.0]), np.array([2.0, 3.0])
-KNOBS = dict(unit=1.0, flat=1e-6, steps=100)
+KNOBS: dict[str, Any] = dict(unit=1.0, flat=1e-6, steps=100)
 
 
 def valley(p):
