@@ -188,7 +188,8 @@ class RKPM(AbstractScatteredMap):
         Returns
         -------
         errors : (n,) or (n, outputs) array
-            In the unit of the force, exact for a local fit whose support is kept. `jax.grad`, `jax.hessian` and
+            In the unit of the force, exact for a local fit whose support is kept. Keep the dilation above a half, as
+            `tuned` does: where a support holds hardly more than its own node the errors have no meaning. `jax.grad`, `jax.hessian` and
             `jax.vmap` apply; the neighbours are searched anew, and a node that becomes one weighs nothing at first.
         """
         require_x64()
