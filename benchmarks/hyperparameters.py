@@ -7,8 +7,8 @@ those of largest likelihood, `jax.lax.map` those of least leave-one-out error; `
 95 in 100 should hold the truth. `below` is how many nats, in the median, an end lies below that of our likelihood
 study; for ends by leave-one-out this is a price and no fault. RKPM's scales and dilation are found by its own
 leave-one-out error, set after set within one program. scikit-learn and SMT (ten sets of it), both under the BSD
-licence, fit the same sets where they are installed. Times are processor seconds for all sets, with compilation (`cold`) and
-without (`warm`).
+licence, fit the same sets where they are installed. Times are processor seconds for all sets, with compilation
+(`cold`) and without (`warm`).
 """
 
 import argparse
@@ -142,11 +142,8 @@ def main() -> None:
             continue
         centred = [(points, one - one.mean()) for points, one in zip(states[:sets], force[:sets], strict=True)]
         found, times = timed(lambda fit=fit, some=centred: np.stack([fit(*one) for one in some]), 1)
-        told(
-            module,
-            [times[0] * arguments.sets / len(centred)],
-            below=float(np.median(np.asarray(value(jnp.asarray(found), x[:sets], f[:sets])) - best[:sets])),
-        )
+        below = np.median(np.asarray(value(jnp.asarray(found), x[:sets], f[:sets])) - best[:sets])
+        told(module, [times[0] * arguments.sets / len(centred)], below=float(below))
     if arguments.out:
         arguments.out.write_text(json.dumps(table, indent=1))
 
