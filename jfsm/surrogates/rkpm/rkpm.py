@@ -190,7 +190,8 @@ class RKPM(AbstractScatteredMap):
         errors : (n,) or (n, outputs) array
             In the unit of the force, exact for a local fit whose support is kept. Keep the dilation above a half, as
             `tuned` does: where a support holds hardly more than its own node the errors have no meaning.
-            `jax.grad`, `jax.hessian` and `jax.vmap` apply; the neighbours are searched anew, and a node that becomes one weighs nothing at first.
+            `jax.grad`, `jax.hessian` and `jax.vmap` apply; the neighbours are searched
+            anew, and a node that becomes one weighs nothing at first.
         """
         require_x64()
         order = whole_number(order, "order", 1)
