@@ -23,7 +23,16 @@ from .fitting import Options, Part, fit_part
 from .leave_one_out import LeaveOneOut
 from .likelihood import Readings
 from .likelihood import negative_log_likelihood as _negative_log_likelihood
-from .posterior import AbstractPosterior, Orders, Posterior, derivatives_at, draw, left_out, standard_errors_at
+from .posterior import (
+    AbstractPosterior,
+    Orders,
+    Posterior,
+    condition,
+    derivatives_at,
+    draw,
+    left_out,
+    standard_errors_at,
+)
 from .readings import check_readings
 from .trend import PolynomialTrend, as_trend, trend_basis
 
@@ -178,18 +187,35 @@ class Kriging(AbstractForceStateMap):
             In nats. Not finite where the matrix of correlations is not positive definite. Eq. 67 of the paper drops
             the n/2 that eq. 66 leaves in eq. 64; it is kept here.
         """
-        require_x64()
-        trend = as_trend(trend)
-        log_parameters = _numbers(log_parameters, "log_parameters", 1)
-        states, force = _numbers(states, "states", 2), _numbers(force, "force", (1, 2))
-        if log_parameters.shape != (states.shape[1] + 1,):
-            raise ValueError(
-                f"`log_parameters` must hold the logarithms of {states.shape[1]} length scales and of the nugget, "
-                f"shape ({states.shape[1] + 1},); got shape {log_parameters.shape}."
-            )
-        if not isinstance(states, Tracer) and not isinstance(force, Tracer):
-            check_readings(states, force, len(trend.exponents(states.shape[1])))
+        log_parameters, states, force, trend = _point(log_parameters, states, force, trend)
         return _likelihood(log_parameters, states, force, _correlation(correlation), trend, restricted)
+
+    @staticmethod
+    def leave_one_out_errors(
+        log_parameters: Float[ArrayLike, " parameters"],
+        states: Float[ArrayLike, "n dim"],
+        force: Float[ArrayLike, "n *outputs"],
+        correlation: AbstractCorrelation | None = None,
+        trend: str | PolynomialTrend = "quadratic",
+    ) -> Float[Array, "n *outputs"]:
+        """Every reading minus what the others say there, as a function of the hyper-parameters.
+
+        The mean of their squares is another measure of hyper-parameters than the likelihood, which needs no process
+        variance and trusts the correlation less; `leave_one_out` gives the same errors of a map that was fitted.
+
+        Parameters
+        ----------
+        log_parameters, states, force, correlation, trend
+            As for `negative_log_likelihood`; all may be traced.
+
+        Returns
+        -------
+        errors : (n,) or (n, outputs) array
+            In the unit of the force, exact for hyper-parameters that are kept (Dubrule 1983). Not finite where the
+            matrix of correlations is not positive definite.
+        """
+        log_parameters, states, force, trend = _point(log_parameters, states, force, trend)
+        return _left_out(log_parameters, states, force, _correlation(correlation), trend)
 
     @property
     def dim(self) -> int:
@@ -392,12 +418,36 @@ def _numbers(value: Any, name: str, ndim: int | tuple[int, ...]) -> Array:
     return jnp.asarray(as_array(array, name, ndim))
 
 
+def _point(log_parameters: Any, states: Any, force: Any, trend: Any) -> tuple[Array, Array, Array, PolynomialTrend]:
+    """Arguments of a function of the hyper-parameters, checked as far as they are not traced."""
+    require_x64()
+    trend = as_trend(trend)
+    log_parameters = _numbers(log_parameters, "log_parameters", 1)
+    states, force = _numbers(states, "states", 2), _numbers(force, "force", (1, 2))
+    if log_parameters.shape != (states.shape[1] + 1,):
+        raise ValueError(
+            f"`log_parameters` must hold the logarithms of {states.shape[1]} length scales and of the nugget, "
+            f"shape ({states.shape[1] + 1},); got shape {log_parameters.shape}."
+        )
+    if not isinstance(states, Tracer) and not isinstance(force, Tracer):
+        check_readings(states, force, len(trend.exponents(states.shape[1])))
+    return log_parameters, states, force, trend
+
+
 @eqx.filter_jit
 def _likelihood(log_parameters, states, force, correlation, trend, restricted):
     _, basis = trend_basis(trend, states)
     columns = force.reshape(len(states), -1)
     readings = Readings(states, basis, columns, jnp.ones(len(states)), correlation, None, restricted)
     return _negative_log_likelihood(log_parameters, readings, jnp.zeros(()))
+
+
+@eqx.filter_jit
+def _left_out(log_parameters, states, force, correlation, trend):
+    basis, f = trend_basis(trend, states)
+    readings = Readings(states, f, force.reshape(len(states), -1), jnp.ones(len(states)), correlation, None, False)
+    errors, _ = condition(readings, basis, log_parameters, jnp.zeros(())).left_out()
+    return errors.reshape(force.shape)
 
 
 def _scaled(part: AbstractPosterior) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -11,14 +11,17 @@ from jaxtyping import Array, Float, Int
 from numpy.typing import NDArray
 
 from .basis import basis_size, monomials
-from .estimates import Neighbourhood, Rule
+from .estimates import Neighbourhood, Rule, nearest_nodes
 from .many import apart, neighbourhoods, search_tree
 from .nodes import Nodes
 from .shape_functions import moment_matrix, safe_root, window_weights
-from .support import BEYOND
+from .support import BEYOND, gathered_nodes
 
 RIDGE = 1e-13
 """Added to the moment matrix scaled to a unit diagonal: a degenerate neighbourhood scores badly and does not fail."""
+
+BATCH = 32
+"""Nodes in one block of factorisations where the neighbours are searched by brute force."""
 
 LEAST_FREEDOM = 1e-9
 """Share of a reading that the others carry, below which leaving it out has no meaning."""
@@ -57,6 +60,23 @@ def _errors(
         return jax.vmap(lambda near, state: error_at_node(near, state, scale, support, rule))(around, states)
 
     return jax.lax.map(at, supports)
+
+
+def errors_within(nodes: Nodes, rule: Rule, chosen: Int[Array, " chosen"]) -> Float[Array, "chosen outputs"]:
+    """Reading minus the map without it at nodes `chosen`, with neighbours by brute force: traceable, also in the nodes.
+
+    Which nodes are neighbours may change with the scales and never makes a step: a node that enters weighs nothing.
+    """
+
+    def at(state: Float[Array, " dim"]) -> Float[Array, " outputs"]:
+        near = nearest_nodes(nodes, state, gathered_nodes(rule.neighbours, len(nodes)), rule.across)
+        near = near._replace(force=near.force.reshape(len(near.force), -1))
+        return error_at_node(near, state, nodes.scale, rule.neighbours, rule)
+
+    blocks = -(-len(chosen) // BATCH)
+    width = -(-len(chosen) // blocks)  # of one size, lest the rest be a second program
+    even = jnp.resize(chosen, (blocks, width))
+    return jax.lax.map(jax.vmap(at), nodes.states[even]).reshape(blocks * width, -1)[: len(chosen)]
 
 
 def error_at_node(

@@ -6,9 +6,11 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from ..._types import is_traced
+from ..._types import as_array, is_traced, require_x64
+from .._readings import check_shapes
 from .._scattered import AbstractScatteredMap, whole_number
 from .basis import DerivativeTargets, MultiIndex, basis_size, derivative_targets, first_derivatives
 from .estimates import (
@@ -21,16 +23,17 @@ from .estimates import (
     standard_error_at,
 )
 from .interfaces import Interface
-from .leave_one_out import leave_one_out_errors
+from .leave_one_out import errors_within, leave_one_out_errors
 from .many import evaluate_many
-from .nodes import Nodes, prepare_nodes
+from .nodes import Nodes, check_enough, prepare_nodes
 from .report import Support, supports
 from .robust import doubted
 from .rule import weighing_rule
 from .selection import Score, choose
 from .shape_functions import LocalBasis
 from .support import gathered_nodes
-from .tuning import tune
+from .tuning import log_parameters as known_parameters
+from .tuning import tune, with_parameters
 from .windows import AbstractWindow
 
 
@@ -148,7 +151,8 @@ class RKPM(AbstractScatteredMap):
     def tuned(self) -> "RKPM":
         """This map with the scale of each column, the dilation and the window's width at the least leave-one-out error.
 
-        By gradient (L-BFGS-B on logarithms, 20 steps at most), from the values it has and at 300 nodes at most.
+        By gradient (BFGS on logarithms, 30 evaluations at most), from the values it has and at 300 nodes at most;
+        `leave_one_out_errors` is the function that it makes small.
         """
         return RKPM(*tune(self.nodes, self.rule))
 
@@ -159,6 +163,54 @@ class RKPM(AbstractScatteredMap):
         """
         errors = leave_one_out_errors(self.nodes, self.rule, [self.rule.neighbours])[0]
         return jnp.asarray(errors.reshape(self.nodes.force.shape))
+
+    @staticmethod
+    def leave_one_out_errors(
+        log_parameters: Float[ArrayLike, " parameters"],
+        states: Float[ArrayLike, "n dim"],
+        force: Float[ArrayLike, "n *outputs"],
+        order: int = 3,
+        neighbours: int | None = None,
+        window: AbstractWindow | None = None,
+    ) -> Float[Array, "n *outputs"]:
+        """Every reading minus what the others say there, as a function of what weighs them.
+
+        Parameters
+        ----------
+        log_parameters : (dim + 1 + numbers of the window,) array
+            Natural logarithms of the scale of every column, in its unit; of the dilation, at most 0; and of the numbers
+            that shape the window: the width of a `GaussianWindow`, none of the splines. Only the ratios of the scales
+            matter, since the support follows the nodes.
+        states, force, order, neighbours, window
+            As for `fit`. Log-parameters, states and force may be traced. Readings at one state are not merged: each is
+            left out while its twin stays.
+
+        Returns
+        -------
+        errors : (n,) or (n, outputs) array
+            In the unit of the force, exact for a local fit whose support is kept. Keep the dilation above a half, as
+            `tuned` does: where a support holds hardly more than its own node the errors have no meaning.
+            `jax.grad`, `jax.hessian` and `jax.vmap` apply; the neighbours are searched
+            anew, and a node that becomes one weighs nothing at first.
+        """
+        require_x64()
+        order = whole_number(order, "order", 1)
+        if not is_traced((states, force)):
+            states, force = check_shapes(states, force)
+            check_enough(np.unique(states, axis=0), order)
+        states, force = jnp.asarray(states), jnp.asarray(force)
+        dim, ones = states.shape[1], jnp.ones(len(states))
+        nodes = Nodes(states, force, ones, jnp.ones(dim), reach=jnp.zeros(()))
+        rule = weighing_rule(nodes, order, neighbours, window)
+        size = len(known_parameters(nodes, rule))
+        if not is_traced(log_parameters):
+            log_parameters = as_array(log_parameters, "log_parameters", 1)
+        if np.shape(log_parameters) != (size,):
+            raise ValueError(
+                f"`log_parameters` must hold the logarithms of {dim} scales, of the dilation, and of the numbers of "
+                f"the window, shape ({size},); got shape {np.shape(log_parameters)}."
+            )
+        return _left_out(jnp.asarray(log_parameters), nodes, rule)
 
     def support(self, states: Float[ArrayLike, "q dim"]) -> Support:
         """What is done at each state: nodes in the support, dilation, condition, and whether the map extrapolates."""
@@ -247,6 +299,12 @@ def _derivatives(
 ) -> Float[Array, "derivatives *outputs"]:
     near, local = _checked_basis(force_map, state)
     return local.derivatives(targets, near.force)
+
+
+@eqx.filter_jit
+def _left_out(log_parameters: Float[Array, " parameters"], nodes: Nodes, rule: Rule) -> Float[Array, "n *outputs"]:
+    errors = errors_within(*with_parameters(log_parameters, nodes, rule), jnp.arange(len(nodes)))
+    return errors.reshape(nodes.force.shape)
 
 
 @eqx.filter_jit

@@ -1,4 +1,4 @@
-"""Scales, dilation and window of a map fitted to its readings by the gradient of the leave-one-out error."""
+"""Scales, dilation and window of a map by the gradient of its leave-one-out errors."""
 
 import equinox as eqx
 import jax
@@ -6,66 +6,63 @@ import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float
-from scipy.optimize import minimize
 
 from ..._types import evenly_taken
-from .estimates import Rule, nearest_nodes
-from .leave_one_out import error_at_node
+from .._minimise import minimise_within
+from .estimates import Rule
+from .leave_one_out import errors_within
 from .nodes import Nodes
-from .support import gathered_nodes
 
 MOST_JUDGED = 300
-BATCH = 32
 FARTHEST = np.log(8.0)
 """Largest change of a scale or a window's width, as a logarithm."""
 SMALLEST_DILATION = np.log(0.5)
-STEPS = 20
+STEPS = 30
+"""Evaluations."""
+FLAT = 1e-3
+"""Slope of the logarithm of the error at which it counts as least."""
 
 
 def tune(nodes: Nodes, rule: Rule) -> tuple[Nodes, Rule]:
-    """Nodes and rule at the smallest mean square of leave-one-out errors."""
-    judged = evenly_taken(len(nodes), MOST_JUDGED)
-    start = _start(nodes, rule)
-    bounds = [(-FARTHEST, FARTHEST)] * len(start)
-    bounds[nodes.dim] = (min(SMALLEST_DILATION, start[nodes.dim]), 0.0)
+    """Nodes and rule at the smallest mean square of leave-one-out errors, never a larger one than they have."""
+    judged = jnp.asarray(evenly_taken(len(nodes), MOST_JUDGED))
+    start = np.asarray(log_parameters(nodes, rule))
+    lower, upper = start - FARTHEST, start + FARTHEST
+    lower[nodes.dim], upper[nodes.dim] = min(SMALLEST_DILATION, start[nodes.dim]), 0.0
 
-    def objective(values: np.ndarray) -> tuple[float, np.ndarray]:
-        error, slope = _log_error(jnp.asarray(values), nodes, rule, jnp.asarray(judged))
-        return float(error), np.asarray(slope)
+    def objective(values: np.ndarray) -> tuple[Array, Array]:
+        return _log_error(jnp.asarray(values), nodes, rule, judged)
 
-    found = minimize(objective, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": STEPS})
-    return _turned(jnp.asarray(found.x), nodes, rule)
-
-
-def _start(nodes: Nodes, rule: Rule) -> np.ndarray:
-    """Logarithms of the factors on the scales, of the dilation, and of the factors on what shapes the window."""
-    shape = jax.tree.leaves(eqx.filter(rule.window, eqx.is_inexact_array))
-    start = np.zeros(nodes.dim + 1 + sum(leaf.size for leaf in shape))
-    start[nodes.dim] = np.log(rule.dilation)
-    return start
+    found = minimise_within(objective, start, lower, upper, unit=1.0, flat=FLAT, steps=STEPS)
+    if not found.value < float(objective(start)[0]):
+        return nodes, rule
+    return with_parameters(jnp.asarray(found.parameters), nodes, rule)
 
 
-def _turned(values: Float[Array, " knobs"], nodes: Nodes, rule: Rule) -> tuple[Nodes, Rule]:
-    """Nodes and rule with those factors put in."""
-    scale, dilation, factors = values[: nodes.dim], values[nodes.dim], values[nodes.dim + 1 :]
+def log_parameters(nodes: Nodes, rule: Rule) -> Float[Array, " parameters"]:
+    """Logarithms of the scales, of the dilation, and of the numbers that shape the window."""
+    shape, _ = ravel_pytree(eqx.filter(rule.window, eqx.is_inexact_array))
+    return jnp.log(jnp.concatenate([nodes.scale, rule.dilation[None], shape]))
+
+
+def with_parameters(values: Float[Array, " parameters"], nodes: Nodes, rule: Rule) -> tuple[Nodes, Rule]:
+    """Nodes and rule whose `log_parameters` are these."""
+    scale, dilation, numbers = jnp.split(jnp.exp(values), [nodes.dim, nodes.dim + 1])
     shape, fixed = eqx.partition(rule.window, eqx.is_inexact_array)
-    flat, restore = ravel_pytree(shape)
-    window = eqx.combine(restore(flat * jnp.exp(factors)), fixed)
+    window = eqx.combine(ravel_pytree(shape)[1](numbers), fixed)
     return (
-        eqx.tree_at(lambda tree: tree.scale, nodes, nodes.scale * jnp.exp(scale)),
-        eqx.tree_at(lambda tree: (tree.window, tree.dilation), rule, (window, jnp.exp(dilation))),
+        eqx.tree_at(lambda tree: tree.scale, nodes, scale),
+        eqx.tree_at(lambda tree: (tree.window, tree.dilation), rule, (window, dilation[0])),
     )
 
 
 @eqx.filter_jit
-def _log_error(values: Float[Array, " knobs"], nodes: Nodes, rule: Rule, judged: Array) -> tuple[Array, Array]:
-    def error(values: Float[Array, " knobs"]) -> Float[Array, ""]:
-        tuned, new_rule = _turned(values, nodes, rule)
-
-        def at(state: Float[Array, " dim"]) -> Float[Array, ""]:
-            near = nearest_nodes(tuned, state, gathered_nodes(rule.neighbours, len(nodes)), rule.across)
-            return jnp.sum(error_at_node(near, state, tuned.scale, new_rule.neighbours, new_rule) ** 2)
-
-        return 0.5 * jnp.log(jnp.mean(jax.lax.map(at, nodes.states[judged], batch_size=min(BATCH, len(judged)))))
+def _log_error(
+    values: Float[Array, " parameters"], nodes: Nodes, rule: Rule, judged: Array
+) -> tuple[Float[Array, ""], Float[Array, " parameters"]]:
+    def error(values: Float[Array, " parameters"]) -> Float[Array, ""]:
+        return 0.5 * jnp.log(
+            jnp.mean(jnp.sum(errors_within(*with_parameters(values, nodes, rule), judged) ** 2, axis=1))
+        )
 
     return jax.value_and_grad(error)(values)
