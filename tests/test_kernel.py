@@ -1,13 +1,12 @@
 """A loop that is one kernel gives what the loop gives, and where XLA refuses a kernel there is none."""
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from jfsm.dynamics import _kernel
-from jfsm.dynamics._kernel import jit_with_kernels, one_kernel_scan
+from jfsm.dynamics._kernel import jit_with_kernels
 
 MATRIX = np.array([[2.0, 0.3, 0.0], [0.1, 3.0, 0.2], [0.0, 0.5, 2.5]])
 
