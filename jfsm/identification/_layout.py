@@ -52,21 +52,16 @@ def with_vector(plant: Plant, vector: Float[Array, " size"]) -> Plant:
     return replace(plant, **parts)
 
 
-def part_of(plant: Plant, numbers: np.ndarray, name: str) -> np.ndarray:
-    """Of the numbers (lanes, size) of several plants those (lanes, part) of one of its arrays."""
-    return numbers[:, _place_of(plant, name)]
-
-
-def without_part(plant: Plant, numbers: np.ndarray, name: str) -> tuple[Plant, np.ndarray]:
-    """Plant and numbers (lanes, size) of several such plants without one of its arrays."""
-    kept = np.delete(numbers, _place_of(plant, name), 1)
-    return replace(plant, **{name: getattr(plant, name)[:0]}), kept
-
-
-def _place_of(plant: Plant, name: str) -> slice:
+def place_of(plant: Plant, name: str) -> slice:
+    """Where the numbers of one of its arrays stand in those of a plant."""
     sizes = {part: int(np.prod(getattr(plant, part).shape)) for part in _PARTS}
     begin = sum(sizes[part] for part in _PARTS[: _PARTS.index(name)])
     return slice(begin, begin + sizes[name])
+
+
+def without_part(plant: Plant, name: str) -> Plant:
+    """The plant without one of its arrays."""
+    return replace(plant, **{name: getattr(plant, name)[:0]})
 
 
 class _Layout:

@@ -10,6 +10,8 @@ rule of differentiation has to know what a law does.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -25,7 +27,7 @@ from ..dynamics._plant import Plant, Readout
 from ..estimation._filter import Assumed, Innovations, ProcessNoise, Readings, State, Stretch, begun, on_lanes, run
 from ..estimation._imposed import force_innovations
 from ._drive import between_samples, forces_before, punctual_force
-from ._layout import part_of, with_vector, without_part
+from ._layout import place_of, with_vector, without_part
 
 SAMPLES = 1024
 """Samples that a program runs at a time; fewer are padded, so that one program serves records of any length."""
@@ -119,13 +121,13 @@ class Runs(NamedTuple):
     """What lanes are to do on one record.
 
     `numbers` (lanes, size) are those of each plant, then x0, v0 and logarithms of the factors on the channels' noise;
-    `velocity` (lanes, dof, dof) is their process noise, `use` (n, channels) which readings they use, `push`
-    (lanes, n, dof), if there is any, a force that drives them as well.
+    `velocity` (lanes, dof, dof) is their process noise, `use` (n, channels) which readings they use, where not all that
+    the record has, `push` (lanes, n, dof), if there is any, a force that drives them as well.
     """
 
     numbers: np.ndarray
     velocity: np.ndarray
-    use: np.ndarray
+    use: np.ndarray | None = None
     push: np.ndarray | None = None
 
     def split(self) -> list["Runs"]:
@@ -138,15 +140,44 @@ class Runs(NamedTuple):
         ]
 
 
-class Scene(NamedTuple):
-    """What all lanes share: a plant (of it the numbers that parameters can change do not matter), which channels show
-    what, what is imposed, the readings, and the standard deviation (state,) of the state at the first sample."""
+@dataclass(frozen=True)
+class Scene:
+    """What all lanes share.
+
+    A plant (of it the numbers that parameters can change do not matter), which channels show what, what is imposed, the
+    readings, and the standard deviation (state,) of the state at the first sample. `stretches` keeps those of the
+    record, by their first sample.
+    """
 
     plant: Plant
     show: Readout
     fine: Fine | Imposed
     readings: Readings
     doubt: np.ndarray
+    stretches: dict[int, Stretch]
+
+    @cached_property
+    def lowered(self) -> tuple[list[Array], Any]:
+        """Arrays on the device, and what makes plant, noise and readout of them; the drive has the force's delay."""
+        readings, plant = self.readings, without_part(self.plant, "force_delay")
+        noise = _Noise(
+            readings.variance, readings.wander, readings.colour, self.doubt, readings.wandering, readings.coloured
+        )
+        leaves, static = jax.tree.flatten((plant, noise, self.show))
+        return jax.device_put(leaves), static
+
+    def stretch(self, begin: int) -> Stretch:
+        """Samples from `begin`, as many as a program runs, as the record has them."""
+        if begin not in self.stretches:
+            fine, readings = self.fine, self.readings
+            assert isinstance(fine, Fine)
+            rows = (_padded(np.asarray(a), begin) for a in (fine.force, fine.base, fine.time))
+            force, base, time = rows
+            lanes = np.broadcast_to(force[:, :, None], (*force.shape[:2], RUNS, force.shape[2]))
+            values, use = (_padded(np.asarray(a), begin) for a in (readings.values, readings.use))
+            before = np.zeros((SAMPLES, RUNS, 0, 5, force.shape[2] + 1))
+            self.stretches[begin] = jax.device_put(Stretch(lanes, base, before, time, values, use))
+        return self.stretches[begin]
 
 
 def innovations_of(scene: Scene, runs: Runs, count: int) -> Innovations:
@@ -162,20 +193,26 @@ def innovations_of(scene: Scene, runs: Runs, count: int) -> Innovations:
 
 def _filtered(scene: Scene, runs: Runs, count: int, found: Innovations) -> None:
     """Put in what a full set of lanes has `found`, or the first of them, a stretch of samples after the other."""
-    plant, numbers = without_part(scene.plant, runs.numbers, "force_delay")  # the drive has it
-    readings = scene.readings
-    noise = _Noise(
-        readings.variance, readings.wander, readings.colour, scene.doubt, readings.wandering, readings.coloured
-    )
-    leaves, static = jax.tree.flatten((plant, noise, scene.show))
-    drive, state = _Drive.of(scene, runs, count), _nowhere(plant, readings)
-    fixed = jax.device_put((leaves, numbers, runs.velocity, np.asarray(drive.fine.step)))
+    leaves, static = scene.lowered
+    numbers = np.delete(runs.numbers, place_of(scene.plant, "force_delay"), 1)
+    drive, state, dt = _Drive.of(scene, runs, count), _nowhere(scene.plant, scene.readings), np.asarray(scene.fine.step)
+    parts = []
     for begin in range(0, count, SAMPLES):
-        end = min(begin + SAMPLES, count)
-        stretch = drive.stretch(begin, end, np.asarray(readings.values), runs.use)
-        state, seen = _run(static, *fixed, stretch, state, np.asarray(begin == 0))
-        for whole, part in zip(found, seen, strict=True):
-            whole[:, begin:end] = np.moveaxis(np.asarray(part), 1, 0)[: len(whole), : end - begin]
+        stretch = drive.put_in(scene.stretch(begin), begin, runs.use)
+        state, seen = _run(static, leaves, numbers, runs.velocity, dt, stretch, state, np.asarray(begin == 0))
+        parts.append(seen)
+    for k, part in enumerate(parts):  # all are on their way by now
+        rows = slice(k * SAMPLES, min((k + 1) * SAMPLES, count))
+        for whole, lanes in zip(found, part, strict=True):
+            whole[:, rows] = np.moveaxis(np.asarray(lanes), 1, 0)[: len(whole), : rows.stop - rows.start]
+
+
+def _padded(rows: np.ndarray, begin: int) -> np.ndarray:
+    """Rows from `begin`, as many as a program runs, zero where there are none."""
+    found = np.zeros((SAMPLES, *rows.shape[1:]))
+    mine = rows[begin : begin + SAMPLES]
+    found[: len(mine)] = mine
+    return found
 
 
 class _Noise(eqx.Module):
@@ -249,45 +286,43 @@ def _nowhere(plant: Plant, readings: Readings) -> State:
 
 
 class _Drive(NamedTuple):
-    """What drives every lane: forces (n, halves, lanes, dof) and what drove earlier (n, lanes, late, 5, dof + 1)."""
+    """What drives lanes otherwise than the record says: forces (n, halves, lanes, dof), and what drove earlier
+    (n, lanes, late, 5, dof + 1); None where it does not."""
 
-    fine: Fine
-    force: np.ndarray
-    before: np.ndarray
+    force: np.ndarray | None
+    before: np.ndarray | None
 
     @classmethod
     def of(cls, scene: Scene, runs: Runs, count: int) -> "_Drive":
-        fine = scene.fine
+        fine, plant = scene.fine, scene.plant
         assert isinstance(fine, Fine)
-        shared = np.asarray(fine.force)
-        force = np.broadcast_to(shared[:count, :, None], (*shared[:count].shape[:2], RUNS, shared.shape[2]))
+        force = before = None
+        if plant.force_delay.size:
+            delays = runs.numbers[:, place_of(plant, "force_delay")] / float(fine.step)
+            force = np.stack([punctual_force(np.asarray(fine.force), tau)[:count] for tau in delays], 2)
         if runs.push is not None:
-            force = force + np.moveaxis(between_samples(runs.push, shared.shape[1], count), 0, 2)
-        if scene.plant.force_delay.size:
-            delays = part_of(scene.plant, runs.numbers, "force_delay")
-            force = np.stack([punctual_force(shared, tau / fine.step)[:count] for tau in delays], 2)
-        late = part_of(scene.plant, runs.numbers, "channel_delay")
-        before = np.zeros((count, RUNS, late.shape[1], 5, shared.shape[2] + 1))
-        for lane, delay in np.ndindex(late.shape):
-            before[:, lane, delay] = forces_before(fine, late[lane, delay])[:count]
-        return cls(fine, force, before)
+            halves = fine.force.shape[1]
+            pushed = np.moveaxis(between_samples(runs.push, halves, count), 0, 2)
+            force = pushed + (np.asarray(fine.force)[:count, :, None] if force is None else force)
+        if plant.channel_delay.size:
+            late = runs.numbers[:, place_of(plant, "channel_delay")]
+            each = [[forces_before(fine, tau)[:count] for tau in lane] for lane in late]
+            before = np.moveaxis(np.array(each), 2, 0)
+        return cls(force, before)
 
-    def stretch(self, begin: int, end: int, values: np.ndarray, use: np.ndarray) -> Stretch:
-        """The samples from `begin` to `end`, padded to as many as a program runs."""
-
-        def padded(rows: np.ndarray) -> np.ndarray:
-            found = np.zeros((SAMPLES, *rows.shape[1:]))
-            found[: end - begin] = rows[begin:end]
-            return found
-
-        base, time = np.asarray(self.fine.base), np.asarray(self.fine.time)
-        return Stretch(*map(padded, (self.force, base, self.before, time, values, use)))
+    def put_in(self, stretch: Stretch, begin: int, use: np.ndarray | None) -> Stretch:
+        """A stretch of the record from sample `begin`, driven so, of which lanes use these readings."""
+        given = {"force": self.force, "before": self.before, "use": use}
+        return stretch._replace(**{name: _padded(rows, begin) for name, rows in given.items() if rows is not None})
 
 
 def _along_motion(scene: Scene, runs: Runs, count: int, found: Innovations) -> None:
     """The same of the force readings along an imposed motion."""
     rows, readings = scene.fine.time.shape[0], scene.readings
-    seen = readings.values, jnp.asarray(runs.use), readings.variance, readings.valid
+    use = np.asarray(readings.use).copy()
+    if runs.use is not None:
+        use[: len(runs.use)] = runs.use[: len(use)]
+    seen = readings.values, use, readings.variance, readings.valid
     seen = Readings(*(a if a.ndim == 1 and a.size != readings.valid.size else a[:rows] for a in seen))
     along = _along(scene.plant, runs.numbers, scene.show, scene.fine, seen, runs.velocity, scene.doubt)
     for whole, part in zip(found, along, strict=True):

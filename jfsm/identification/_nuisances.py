@@ -20,7 +20,7 @@ from ..dynamics._imposed import Imposed, Path, imposed_motion, imposed_substeps,
 from ..dynamics._plant import Channel, Readout, lower, readout
 from ..dynamics._simulate import check_pair
 from ..dynamics._start import starting_state
-from ..estimation._filter import ProcessNoise, Readings
+from ..estimation._filter import ProcessNoise, Readings, Stretch
 from ..records import Record, clipped, noise_floor, quantisation_step, spikes
 from ..structures import Structure
 from ._channels import LEAST_NOISE, driving, forces, readings_of, spread_of
@@ -35,8 +35,8 @@ _SAME = 1e-9
 """Rounding, relative."""
 _STOPPED = 1 / 3
 """Share of the time in which damping stops a motion, where nothing is elastic, that counts as a period."""
-_LEADING = 4096
-"""Readings, the first ones, that lead to a basin,"""
+_LEADING, _PERIODS = 1024, 20
+"""Samples, the first ones, and periods of the motion in them, that lead to a basin,"""
 _LOUD = 0.25
 """where their power is such a share of that of all, at least."""
 
@@ -76,6 +76,8 @@ class Nuisances:
         Share of the elastic force that no hypothesis has to explain: what all of them lack.
     colour : Colour or None
         Memory of the channels' noise, where it is known to have one.
+    stretches : dict
+        What programs saw of the record, kept for the next of them.
     """
 
     record: Record
@@ -102,6 +104,7 @@ class Nuisances:
     path: Path | None = None
     forgiven: float = 0.0
     colour: Colour | None = None
+    stretches: dict[int, Stretch] = field(default_factory=dict, init=False, repr=False)
     _heads: dict[int, tuple[Fine | Imposed, Readings]] = field(default_factory=dict, init=False, repr=False)
 
     @property
@@ -151,7 +154,7 @@ class Nuisances:
         """Readings that lead to a basin: the first ones, more of them where the record is quiet at first."""
         values, used = (np.asarray(a)[: self.samples] for a in (self.readings.values, self.readings.use))
         power = np.cumsum(np.sum(used * ((values - values.mean(0)) / self.spread) ** 2, 1))
-        count = _LEADING
+        count = max(_LEADING, math.ceil(_PERIODS * 2 * math.pi / (self.omega * self.record.dt)))
         while count < self.samples and power[count - 1] / count < _LOUD * power[-1] / self.samples:
             count *= 2
         return min(count, self.samples)

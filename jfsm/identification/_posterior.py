@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import jax
 import numpy as np
@@ -105,7 +105,7 @@ class Posterior:
         total = prior(self.hypothesis.unknowns[0], theta)[0]
         for index, (nuisances, until) in enumerate(zip(self.records, self.until, strict=True)):
             use = np.asarray(nuisances.readings.use)[:until]
-            found = self._run(theta[None], index, 0, use, np.full(1, nuisances.forgiven), until)
+            found = self._run(theta[None], index, 0, np.full(1, nuisances.forgiven), until)
             total += value_and_slopes(lambda _, found=found: found, np.zeros(0), use).value
         return total
 
@@ -127,7 +127,7 @@ class Posterior:
         def run(values: np.ndarray) -> Innovations:
             every = np.repeat(theta[None], len(values), 0)
             every[:, mine] = values
-            return self._run(every, index, lane, use, np.full(len(values), forgiven), until)
+            return self._run(every, index, lane, np.full(len(values), forgiven), until)
 
         return value_and_slopes(run, theta[mine], use)
 
@@ -136,20 +136,18 @@ class Posterior:
         theta: np.ndarray,
         index: int,
         lane: int,
-        use: np.ndarray,
         slack: np.ndarray,
         until: int,
+        use: np.ndarray | None = None,
         push: np.ndarray | None = None,
         nuisances: Nuisances | None = None,
     ) -> Innovations:
         """Innovations (runs, until, channels) of record `index` at values (runs, unknowns) and slacks (runs,)."""
-        nuisances, part = self.records[index] if nuisances is None else nuisances, self._parts[index][lane]
-        fine, readings = nuisances.head(until)
+        part = self._parts[index][lane]
+        scene = part.scene(self.records[index], until) if nuisances is None else part.of_record(nuisances, until)
+        nuisances = self.records[index] if nuisances is None else nuisances
         velocity = np.stack([slackened(nuisances, share).velocity for share in slack])
-        scene = Scene(part.plant, nuisances.show, fine, readings, _doubt(part.plant, nuisances))
-        padded = np.zeros(readings.use.shape)
-        padded[:until] = use[:until]
-        return innovations_of(scene, Runs(part.numbers(theta[:, part.mine]), velocity, padded, push), until)
+        return innovations_of(scene, Runs(part.numbers(theta[:, part.mine]), velocity, use, push), until)
 
     def innovations(
         self,
@@ -185,10 +183,10 @@ class Posterior:
         """`innovations` (runs, n, channels) at values (runs, unknowns), each with its `push` and its `slack`."""
         nuisances = self.records[index]
         n, own = nuisances.samples, np.asarray(nuisances.readings.use)
-        masked = own[:n] if use is None else own[:n] * use
+        masked = None if use is None else own[:n] * use
         values = theta if noise_scales else np.stack([self.at_the_floor(one) for one in theta])
         loose = np.zeros(len(theta)) if slack is None else slack
-        return self._run(values, index, 0, masked, loose, n, push)
+        return self._run(values, index, 0, loose, n, masked, push)
 
     def at_the_floor(self, theta: np.ndarray) -> np.ndarray:
         """The same values (unknowns,), the noise of every channel as strong as it was taken to be."""
@@ -228,7 +226,7 @@ class Posterior:
                 seen = replace(
                     nuisances, readings=colour.on(nuisances.readings), noise=colour.of_force(nuisances.noise)
                 )
-                found.append(self._run(theta[None], index, 0, use, np.zeros(1), until, nuisances=seen))
+                found.append(self._run(theta[None], index, 0, np.zeros(1), until, nuisances=seen))
             return Innovations(*(np.concatenate(each) for each in zip(*found, strict=True)))
 
         found = value_and_slopes(run, values, use)
@@ -266,6 +264,21 @@ class _Part:
     unit: np.ndarray
     log: np.ndarray
     tie: np.ndarray
+    scenes: dict[int, Scene] = field(default_factory=dict)
+
+    def scene(self, nuisances: Nuisances, until: int) -> Scene:
+        """`of_record` of the record that the part was made for, made once."""
+        key = nuisances.head(until)[0].time.shape[0] if isinstance(nuisances.fine, Imposed) else 0
+        if key not in self.scenes:
+            self.scenes[key] = self.of_record(nuisances, until)
+        return self.scenes[key]
+
+    def of_record(self, nuisances: Nuisances, until: int) -> Scene:
+        """What runs of this plant share on a record, of which the first samples count."""
+        imposed = isinstance(nuisances.fine, Imposed)
+        fine, readings = nuisances.head(until) if imposed else (nuisances.fine, nuisances.readings)
+        doubt = _doubt(self.plant, nuisances)
+        return Scene(self.plant, nuisances.show, fine, readings, doubt, nuisances.stretches)
 
     def numbers(self, theta: np.ndarray) -> np.ndarray:
         """Numbers (runs, size) at values (runs, unknowns)."""
