@@ -195,7 +195,8 @@ def test_the_likelihoods_of_two_records_add_up(chain_nuisances, smooth):
 
 def test_samples_after_the_end_that_counts_have_no_part(chain_nuisances, smooth):
     until = 195
-    torn = chain_nuisances.readings.values.at[until:].add(0.5)
+    torn = np.array(chain_nuisances.readings.values)
+    torn[until:] += 0.5
     spoiled = replace(chain_nuisances, readings=eqx.tree_at(lambda r: r.values, chain_nuisances.readings, torn))
     values = [
         Posterior(smooth.hypothesis, [nuisances], ends).evaluate(somewhere(smooth))[0][0]
@@ -259,15 +260,15 @@ def test_the_first_readings_lead_unless_the_record_begins_quietly():
         prepare(jfsm.Record(record.time, **{name: size * y for name, y in channels.items()}), SINGLE)
         for size in (1.0, quiet)
     )
-    assert steady.leading == 4096
+    assert steady.leading == 1024
     assert begun_late.leading == 8192
 
 
 @pytest.fixture
 def traces(monkeypatch) -> list[None]:
     """One entry for each time that the likelihood is traced into a program."""
-    found, numbers = [], _likelihood._numbers
-    monkeypatch.setattr(_likelihood, "_numbers", lambda *args: found.append(None) or numbers(*args))
+    found, tail = [], _likelihood._tail
+    monkeypatch.setattr(_likelihood, "_tail", lambda *args: found.append(None) or tail(*args))
     return found
 
 
@@ -291,13 +292,28 @@ def test_friction_has_one_program_for_every_place(single_nuisances, friction, tr
     assert not traces
 
 
-def test_records_of_like_length_share_a_program_wherever_they_end(chain_nuisances, smooth, traces):
+def test_records_of_any_length_share_a_program_wherever_they_end(chain_nuisances, smooth, traces):
     smooth.evaluate(smooth.initial())
     traces.clear()
     Posterior(smooth.hypothesis, [chain_nuisances], [194]).evaluate(smooth.initial())
-    longer = prepare(noisy_record(MODEL, n=N + 5), MODEL)
-    Posterior(hypothesis(MODEL, CUBIC, longer), [longer]).evaluate(smooth.initial())
+    for n in (N // 2, N + 5, 7 * N):
+        other = prepare(noisy_record(MODEL, n=n), MODEL)
+        Posterior(hypothesis(MODEL, CUBIC, other), [other]).evaluate(smooth.initial())
     assert not traces
+
+
+def test_a_run_is_the_same_in_one_stretch_and_in_several(chain_nuisances, smooth, monkeypatch):
+    """Also where runs differ in what drives them, and of a lane more than run at once."""
+    theta = np.repeat(smooth.initial(), _likelihood.RUNS + 1, 0) * np.linspace(1.0, 1.01, _likelihood.RUNS + 1)[:, None]
+    push = 0.1 * np.sin(np.arange(N) / 5.0)[None, :, None] * np.linspace(0, 1, len(theta))[:, None, None] * np.ones(2)
+    whole = smooth.many_innovations(theta, push=push)
+    monkeypatch.setattr(_likelihood, "SAMPLES", 64)
+    chain_nuisances.stretches.clear()
+    pieces = smooth.many_innovations(theta, push=push)
+    chain_nuisances.stretches.clear()
+    for one, other in zip(whole, pieces, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * np.max(np.abs(one)))
+    assert not np.allclose(whole.error[0], whole.error[-1], rtol=1e-3)
 
 
 def test_steps_are_short_enough_for_the_stiffest_structure_asked_for_and_the_drive_stays_the_same(chain_nuisances):

@@ -20,6 +20,8 @@ Late = Mapping[tuple[str, int], float]
 """How late channels are, by (kind, degree of freedom) [s]."""
 _STEP = 0.25
 """Samples by which a channel is read earlier and later."""
+_FARTHER = 4.0
+"""Times what a parabola about no delay tells that a longer one may gain."""
 
 
 def slightly_late(trials: Sequence[Trial], known: Late, dt: float) -> Late:
@@ -53,6 +55,19 @@ def seems_late(beside: Trial, problem: Problem) -> ChannelDelay | None:
     if most is None or found[most][0] < UNPREDICTED:
         return None
     return ChannelDelay(found[most][1] * problem.first.record.dt, at=most)
+
+
+def gain_of_delay(beside: Trial, channel: tuple[str, int], problem: Problem) -> float:
+    """Nats that a trial would gain at most, as far as a parabola tells, were a channel late; infinite where none does.
+
+    A delay of several samples may gain more than the parabola about none, but not many times more.
+    """
+    if problem.imposed:
+        return math.inf
+    c, now = problem.first.channels.index(channel), _cost(beside, problem)
+    earlier, later = (_cost(beside, _read_later(problem, c, samples)) for samples in (-_STEP, _STEP))
+    slope, curvature = (later - earlier) / 2, later + earlier - 2 * now
+    return _FARTHER * slope**2 / (2 * curvature) if curvature > 0 else math.inf
 
 
 def _cost(t: Trial, problem: Problem) -> float:

@@ -22,7 +22,7 @@ from ._pairs import crossed, instead, joined, pairs
 from ._problem import Problem
 from ._trial import Trial, trial
 
-_FAR_BEHIND = 200.0
+FAR_BEHIND = 200.0
 """Nats behind the leader, one per cent of unmodelled force forgiven, from which a candidate is not pursued,"""
 _ALWAYS_PURSUED = 4
 """unless it is among the best of them."""
@@ -415,7 +415,7 @@ def _near(lots: Sequence[_Lot], least: int, leader: float = math.inf) -> list[_L
     for lot in lots:
         lot.behind = lot.best - leader
     ranked = sorted(lots, key=lambda lot: lot.behind)
-    return [lot for rank, lot in enumerate(ranked) if rank < least or lot.behind < _FAR_BEHIND]
+    return [lot for rank, lot in enumerate(ranked) if rank < least or lot.behind < FAR_BEHIND]
 
 
 def best_of_each(trials: Sequence[Trial]) -> list[Trial]:

@@ -10,7 +10,7 @@ from .._limit import Limit
 from ..dynamics import Reconstruction
 from ..identification import prepare_all
 from ..records import Record
-from ..structures import Cause, Structure
+from ..structures import Cause, ChannelDelay, Structure
 from ._adequacy import GATE, MUCH, NEGLIGIBLE, explained, white
 from ._between import differ
 from ._candidates import Apart, Candidate, as_promising, candidates, contained, elsewhere, promising
@@ -19,10 +19,11 @@ from ._coloured import coloured
 from ._effect import Effect
 from ._enough import hidden, settled, something_left
 from ._lack_of_fit import LackOfFit
-from ._late import seems_late, slightly_late
+from ._late import gain_of_delay, seems_late, slightly_late
 from ._pieces import pieces
 from ._problem import Problem
 from ._search import (
+    FAR_BEHIND,
     Found,
     LeftBehind,
     best_of_each,
@@ -200,16 +201,21 @@ class Study:
             return [t for t in trials if t is best or explained(t, refitted) >= GATE]
 
         tried, left_out = promising(every)
-        found = search(tried, given, refitted, problem, self.steps.of("single causes"))
+        late = [c for c in tried if c.effects[0].cause.effect is ChannelDelay]  # they have a slow program of their own
+        now = [c for c in tried if c not in late] or tried
+        found = search(now, given, refitted, problem, self.steps.of("single causes"))
         if self.limit.over:
             more = []
         elif settled(told([given, refitted, *found.trials])):
             best = max(found.trials, key=lambda t: t.evidence)
+            late, behind = _not_far_behind(late, best, refitted, problem)
+            found = found.and_then(Found([], behind))
             more = contained([law for t in close(found.trials) for law in t.laws], left_out)
             others = [*as_promising(best.effects, every, left_out), *elsewhere(best.effects, left_out)]
             more += [c for c in dict.fromkeys(others) if c not in more]
+            more += [c for c in late if c not in now]
         else:  # of a missing force that is ill seen regression may put the right law last
-            more = [c for c in left_out if c.starts]
+            more = [c for c in left_out if c.starts] + [c for c in late if c not in now]
         if more:
             tell = self.steps.of("more single causes")
             found = found.and_then(search(more, given, refitted, problem, tell))
@@ -279,6 +285,20 @@ def _believed(problem: Problem, near: Trial | None = None) -> tuple[Problem, Tri
         # The noise of the force acts through the mass, and all hypotheses share one noise: that of the likelier mass.
         problem = problem.weighed(near.structure)
     return problem, *fit_model(problem, near=near)
+
+
+def _not_far_behind(
+    late: Sequence[Candidate], best: Trial, refitted: Trial, problem: Problem
+) -> tuple[list[Candidate], list[LeftBehind]]:
+    """Which channels that may be late could come near the best trial, and the others."""
+    near, behind = list[Candidate](), list[LeftBehind]()
+    for candidate in late:
+        nats = best.evidence - refitted.evidence - gain_of_delay(refitted, candidate.effects[0].at, problem)
+        if nats < FAR_BEHIND:
+            near.append(candidate)
+        else:
+            behind.append(LeftBehind(candidate.effects, nats))
+    return near, behind
 
 
 def shows_later(trials: Sequence[Trial]) -> bool:

@@ -299,21 +299,28 @@ class _Drive(NamedTuple):
         force = before = None
         if plant.force_delay.size:
             delays = runs.numbers[:, place_of(plant, "force_delay")] / float(fine.step)
-            force = np.stack([punctual_force(np.asarray(fine.force), tau)[:count] for tau in delays], 2)
+            force = _by_value(delays, lambda tau: punctual_force(np.asarray(fine.force), tau)[:count], 2)
         if runs.push is not None:
             halves = fine.force.shape[1]
             pushed = np.moveaxis(between_samples(runs.push, halves, count), 0, 2)
             force = pushed + (np.asarray(fine.force)[:count, :, None] if force is None else force)
         if plant.channel_delay.size:
             late = runs.numbers[:, place_of(plant, "channel_delay")]
-            each = [[forces_before(fine, tau)[:count] for tau in lane] for lane in late]
-            before = np.moveaxis(np.array(each), 2, 0)
+            before = np.stack(
+                [_by_value(each, lambda tau: forces_before(fine, float(tau))[:count], 1) for each in late.T], 2
+            )
         return cls(force, before)
 
     def put_in(self, stretch: Stretch, begin: int, use: np.ndarray | None) -> Stretch:
         """A stretch of the record from sample `begin`, driven so, of which lanes use these readings."""
         given = {"force": self.force, "before": self.before, "use": use}
         return stretch._replace(**{name: _padded(rows, begin) for name, rows in given.items() if rows is not None})
+
+
+def _by_value(values: np.ndarray, function: Callable[[Any], np.ndarray], axis: int) -> np.ndarray:
+    """What a function makes of each value, along an axis; of the same one but once."""
+    different, which = np.unique(values, return_inverse=True, axis=0)
+    return np.take(np.stack([function(value) for value in different], axis), which.ravel(), axis)
 
 
 def _along_motion(scene: Scene, runs: Runs, count: int, found: Innovations) -> None:
