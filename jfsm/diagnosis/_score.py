@@ -46,7 +46,7 @@ def moved(trial: Trial, posterior: Posterior, index: int, forces: np.ndarray) ->
     nuisances, theta = posterior.records[index], trial.theta
     slack = nuisances.forgiven
     base = posterior.innovations(theta, index, slack=slack)
-    error, deviation = base.error, np.sqrt(np.maximum(base.variance, 1e-300))
+    error, deviation = np.asarray(base.error), np.sqrt(np.maximum(base.variance, 1e-300))
     counted = np.asarray(nuisances.readings.use)[: len(error)] > 0
     counted[0], counted[posterior.until[index] :] = False, False  # the start is an unknown
 
@@ -64,7 +64,8 @@ def moved(trial: Trial, posterior: Posterior, index: int, forces: np.ndarray) ->
 
     def run(lot: slice) -> np.ndarray:
         loose = np.full(len(values[lot]), slack)
-        return posterior.many_innovations(values[lot], index, push=push[lot], slack=loose).error - error
+        found = posterior.many_innovations(values[lot], index, push=push[lot], slack=loose)
+        return np.asarray(found.error) - error
 
     changes = np.concatenate(list(side_by_side(run, lots)))
     changes /= np.concatenate([change[picked], np.full(len(forces), _SMALL)])[:, None, None]

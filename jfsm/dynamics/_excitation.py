@@ -196,6 +196,7 @@ def excitation(
         take = np.arange(n - 1)[:, None] * factor + np.arange(factor + 1)
         known = reconstruct(both, factor, method)[take]
     ahead = xp.broadcast_to(both[-1], (padded - len(known), factor + 1, dof + 1))  # the last leads to no sample
-    intervals = xp.concatenate([known, ahead])
+    intervals: Any = xp.concatenate([known, ahead])
+    step: Any = np.asarray(record.dt)
     time = record.time[0] + record.dt * np.arange(padded)
-    return Fine(intervals[..., :dof], intervals[..., dof], time, np.asarray(record.dt))
+    return Fine(intervals[..., :dof], intervals[..., dof], time, step)

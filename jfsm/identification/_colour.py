@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import equinox as eqx
 import numpy as np
@@ -33,7 +34,8 @@ class Colour(eqx.Module):
     def of(cls, values: np.ndarray, channels: Sequence[int]) -> "Colour":
         """Colour by its logits and logarithms, those of all channels one after the other."""
         memory, share, variance = values[:-1].reshape(3, len(channels))
-        return cls(tuple(channels), expit(memory), expit(share), np.exp(variance), np.exp(values[-1]))
+        numbers: list[Any] = [expit(memory), expit(share), np.exp(variance), np.exp(values[-1])]
+        return cls(tuple(channels), *numbers)
 
     @staticmethod
     def begin(variance: np.ndarray) -> np.ndarray:

@@ -48,4 +48,5 @@ def _shifted(values: np.ndarray, places: float) -> np.ndarray:
         (s + 1) * s * (s - 1) / 6,
     )
     index, last = np.arange(values.size) + whole, values.size - 1
-    return sum(w * values[np.clip(index + k, 0, last)] for w, k in zip(weights, (-1, 0, 1, 2), strict=True))
+    near = np.stack([values[np.clip(index + k, 0, last)] for k in (-1, 0, 1, 2)])
+    return np.asarray(weights) @ near

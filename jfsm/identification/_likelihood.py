@@ -10,7 +10,7 @@ rule of differentiation has to know what a law does.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -31,6 +31,8 @@ from ._layout import place_of, with_vector, without_part
 
 SAMPLES = 1024
 """Samples that a program runs at a time; fewer are padded, so that one program serves records of any length."""
+_KEPT = 8
+"""Stretches of a record that are kept, the first ones: those of a long one would fill the memory."""
 _BLOCKS = 64
 """Stretches of a record whose gradients count as independent of each other."""
 _NUDGE = 1e-6
@@ -89,12 +91,12 @@ def value_and_slopes(run: Callable[[np.ndarray], Innovations], theta: np.ndarray
     `run` gives the innovations (lanes, n, channels) of some values (lanes, unknowns).
     """
 
-    def in_a_row(values: np.ndarray) -> Innovations:
+    def in_a_row(values: np.ndarray) -> Any:
         return Innovations(*(a.reshape(len(values), -1) for a in run(values)))
 
     nudges = _NUDGE * np.eye(theta.size)
     found, use = in_a_row(np.concatenate([theta[None], theta + nudges])), use.ravel()
-    base = Innovations(*(a[0] for a in found))
+    base: Any = Innovations(*(a[0] for a in found))
     with np.errstate(all="ignore"):
         root = np.sqrt(use)
         standard = root / np.sqrt(base.variance)
@@ -102,12 +104,12 @@ def value_and_slopes(run: Callable[[np.ndarray], Innovations], theta: np.ndarray
         value = float(np.sum(use * (normal - base.log_share)))
         mixed = bool(np.any(base.log_share))
 
-        def changes(lanes: Innovations, nudge: float) -> list[np.ndarray]:
+        def changes(lanes: Any, nudge: float) -> list[np.ndarray]:
             by_error = (lanes.error - base.error) * (standard / nudge)
             by_spread = np.log(lanes.variance / base.variance) * (root / nudge)
             return [by_error, by_spread, *([(lanes.log_share - base.log_share) * (use / nudge)] if mixed else [])]
 
-        slopes = changes(Innovations(*(a[1:] for a in found)), _NUDGE)
+        slopes = changes(Innovations(found.error[1:], found.variance[1:], found.log_share[1:]), _NUDGE)
         power = slopes[0] ** 2 + 0.5 * slopes[1] ** 2
         jumped = _HANDFUL * np.max(power, 1, initial=0.0) > _MOSTLY * np.sum(power, 1)
         if np.any(jumped):
@@ -153,7 +155,7 @@ class Scene:
     show: Readout
     fine: Fine | Imposed
     readings: Readings
-    doubt: np.ndarray
+    doubt: Any
     stretches: dict[int, Stretch]
 
     @cached_property
@@ -168,23 +170,26 @@ class Scene:
 
     def stretch(self, begin: int) -> Stretch:
         """Samples from `begin`, as many as a program runs, as the record has them."""
-        if begin not in self.stretches:
-            fine, readings = self.fine, self.readings
-            assert isinstance(fine, Fine)
-            rows = (_padded(np.asarray(a), begin) for a in (fine.force, fine.base, fine.time))
-            force, base, time = rows
-            lanes = np.broadcast_to(force[:, :, None], (*force.shape[:2], RUNS, force.shape[2]))
-            values, use = (_padded(np.asarray(a), begin) for a in (readings.values, readings.use))
-            before = np.zeros((SAMPLES, RUNS, 0, 5, force.shape[2] + 1))
-            self.stretches[begin] = jax.device_put(Stretch(lanes, base, before, time, values, use))
-        return self.stretches[begin]
+        if begin in self.stretches:
+            return self.stretches[begin]
+        fine, readings = self.fine, self.readings
+        assert isinstance(fine, Fine)
+        arrays: Any = fine.force, fine.base, fine.time, readings.values, readings.use
+        force, base, time, values, use = (_padded(np.asarray(array), begin) for array in arrays)
+        lanes: Any = np.broadcast_to(force[:, :, None], (*force.shape[:2], RUNS, force.shape[2]))
+        before: Any = np.zeros((SAMPLES, RUNS, 0, 5, force.shape[2] + 1))
+        found = jax.device_put(Stretch(lanes, base, before, time, values, use))
+        if len(self.stretches) < _KEPT:
+            self.stretches[begin] = found
+        return found
 
 
 def innovations_of(scene: Scene, runs: Runs, count: int) -> Innovations:
     """Innovations (lanes, count, channels) of all lanes on the first `count` samples."""
     along = _along_motion if isinstance(scene.fine, Imposed) else _filtered
     shape = len(runs.numbers), count, scene.readings.values.shape[1]
-    found = Innovations(np.empty(shape), np.empty(shape), np.empty(shape))
+    empty: Callable[..., Any] = np.empty
+    found = Innovations(empty(shape), empty(shape), empty(shape))
     for k, lot in enumerate(runs.split()):
         mine = slice(k * RUNS, min((k + 1) * RUNS, shape[0]))
         along(scene, lot, count, Innovations(*(a[mine] for a in found)))
@@ -207,7 +212,7 @@ def _filtered(scene: Scene, runs: Runs, count: int, found: Innovations) -> None:
             whole[:, rows] = np.moveaxis(np.asarray(lanes), 1, 0)[: len(whole), : rows.stop - rows.start]
 
 
-def _padded(rows: np.ndarray, begin: int) -> np.ndarray:
+def _padded(rows: np.ndarray, begin: int) -> Any:
     """Rows from `begin`, as many as a program runs, zero where there are none."""
     found = np.zeros((SAMPLES, *rows.shape[1:]))
     mine = rows[begin : begin + SAMPLES]
@@ -278,10 +283,11 @@ def _nowhere(plant: Plant, readings: Readings) -> State:
     """A state of all lanes before there is any."""
     dof, slots, reach = plant.dof, len(plant.friction), plant.reach if len(plant.delayed) else 0
     motion, zeros = 2 * dof + plant.hidden, 2 * len(readings.wandering) + len(readings.coloured)
-    past = Past(*np.zeros((2, RUNS, reach, dof)), np.zeros(RUNS, int))
+    none: Callable[..., Any] = np.zeros
+    past = Past(none((RUNS, reach, dof)), none((RUNS, reach, dof)), none(RUNS, int))
     return State(
-        np.zeros((RUNS, dof)), np.zeros((RUNS, dof)), np.zeros((RUNS, plant.hidden)), np.zeros((RUNS, slots), int),
-        past, np.zeros((RUNS, motion + zeros, motion + zeros)), np.zeros((RUNS, slots)), np.zeros((RUNS, zeros)),
+        none((RUNS, dof)), none((RUNS, dof)), none((RUNS, plant.hidden)), none((RUNS, slots), int), past,
+        none((RUNS, motion + zeros, motion + zeros)), none((RUNS, slots)), none((RUNS, zeros)),
     )  # fmt: skip
 
 
@@ -294,8 +300,8 @@ class _Drive(NamedTuple):
 
     @classmethod
     def of(cls, scene: Scene, runs: Runs, count: int) -> "_Drive":
-        fine, plant = scene.fine, scene.plant
-        assert isinstance(fine, Fine)
+        fine: Any = scene.fine
+        plant = scene.plant
         force = before = None
         if plant.force_delay.size:
             delays = runs.numbers[:, place_of(plant, "force_delay")] / float(fine.step)
@@ -325,19 +331,18 @@ def _by_value(values: np.ndarray, function: Callable[[Any], np.ndarray], axis: i
 
 def _along_motion(scene: Scene, runs: Runs, count: int, found: Innovations) -> None:
     """The same of the force readings along an imposed motion."""
-    rows, readings = scene.fine.time.shape[0], scene.readings
-    use = np.asarray(readings.use).copy()
+    seen = scene.readings
     if runs.use is not None:
+        use: Any = np.zeros(seen.use.shape)
         use[: len(runs.use)] = runs.use[: len(use)]
-    seen = readings.values, use, readings.variance, readings.valid
-    seen = Readings(*(a if a.ndim == 1 and a.size != readings.valid.size else a[:rows] for a in seen))
+        seen = replace(seen, use=use)
     along = _along(scene.plant, runs.numbers, scene.show, scene.fine, seen, runs.velocity, scene.doubt)
     for whole, part in zip(found, along, strict=True):
         whole[:] = np.asarray(part)[: len(whole), :count]
 
 
 @eqx.filter_jit
-def _along(plant: Plant, numbers, show: Readout, fine: Imposed, readings: Readings, velocity, doubt) -> Innovations:
+def _along(plant: Plant, numbers, show: Readout, fine: Any, readings: Readings, velocity, doubt) -> Innovations:
     log_scale = _tail(plant, numbers, readings.values.shape[1])[2]
 
     def one(numbers, velocity, log_scale):

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any, cast
 
 import numpy as np
 
@@ -340,14 +341,14 @@ def _prepare_imposed(record: Record, model: Structure, reconstruction: Reconstru
     omega = _rate(values[:, nearest], record.dt)
     motion = [values[:, i : i + 1] for i, (kind, _) in enumerate(channels) if kind != "force"]
     length, crest = _size(channels[nearest:], np.hstack(motion), spread[nearest:], omega)
-    none = np.zeros(model.dof)
+    none, still = np.zeros(model.dof), cast(Any, np.zeros((model.dof, model.dof)))
     return Nuisances(
         record=record,
         channels=channels,
         show=readout(channels, model.dof),
         fine=path.imposed(imposed_substeps(model, record.dt, typical_size(record)), bucket(len(record))),
         readings=_padded(values, use, floor**2),
-        noise=ProcessNoise(np.zeros((model.dof, model.dof))),
+        noise=ProcessNoise(still),
         force_floor=none[:0],
         base_floor=0.0,
         force_covariance=np.zeros((model.dof, model.dof)),
@@ -376,12 +377,13 @@ def _padded(values: np.ndarray, use: np.ndarray, variance: np.ndarray) -> Readin
     """Readings of a length that programs are made for."""
     n, padded = len(values), bucket(len(values))
     fill = ((0, padded - n), (0, 0))
-    return Readings(
-        values=np.pad(values, fill),
-        use=np.pad(use, fill),
-        variance=variance,
-        valid=(np.arange(padded) < n).astype(float),
-    )
+    arrays: dict[str, Any] = {
+        "values": np.pad(values, fill),
+        "use": np.pad(use, fill),
+        "variance": variance,
+        "valid": (np.arange(padded) < n).astype(float),
+    }
+    return Readings(**arrays)
 
 
 def _disturbance(
@@ -390,7 +392,8 @@ def _disturbance(
     """What the noise of what drives and what is never explained do to the velocity in a sample."""
     inverse, size = np.linalg.inv(mass), omega**2 * length
     forced = inverse @ (force_covariance * dt**2) @ inverse.T
-    return ProcessNoise(forced + np.eye(len(mass)) * (_LEAST_DISTURBANCE * size) ** 2 / omega * dt)
+    velocity: Any = forced + np.eye(len(mass)) * (_LEAST_DISTURBANCE * size) ** 2 / omega * dt
+    return ProcessNoise(velocity)
 
 
 def _start(

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import jax
 import numpy as np
@@ -10,7 +11,7 @@ from scipy.optimize import minimize
 
 from ..dynamics._imposed import Imposed
 from ..dynamics._plant import Grid, Plant, hidden_width, numbers_of
-from ..estimation._filter import Innovations, ProcessNoise
+from ..estimation._filter import Innovations
 from ..structures import AbstractFriction, ChannelDelay, ForceDelay, Structure
 from ._colour import Colour
 from ._layout import plant_rows, plant_vector
@@ -146,7 +147,7 @@ class Posterior:
         part = self._parts[index][lane]
         scene = part.scene(self.records[index], until) if nuisances is None else part.of_record(nuisances, until)
         nuisances = self.records[index] if nuisances is None else nuisances
-        velocity = np.stack([slackened(nuisances, share).velocity for share in slack])
+        velocity = np.stack([slackened(nuisances, share) for share in slack])
         return innovations_of(scene, Runs(part.numbers(theta[:, part.mine]), velocity, use, push), until)
 
     def innovations(
@@ -220,14 +221,15 @@ class Posterior:
         use = np.asarray(nuisances.readings.use)[:until]
 
         def run(lanes: np.ndarray) -> Innovations:
-            found = []
+            found = list[Any]()
             for one in lanes:
                 colour = Colour.of(one, channels)
                 seen = replace(
                     nuisances, readings=colour.on(nuisances.readings), noise=colour.of_force(nuisances.noise)
                 )
                 found.append(self._run(theta[None], index, 0, np.zeros(1), until, nuisances=seen))
-            return Innovations(*(np.concatenate(each) for each in zip(*found, strict=True)))
+            together: list[Any] = [np.concatenate(each) for each in zip(*found, strict=True)]
+            return Innovations(*together)
 
         found = value_and_slopes(run, values, use)
         return found.value, found.gradient
@@ -342,14 +344,14 @@ def _slot_bucket(structure: Structure) -> int:
     return 1 if count <= 1 else 2 ** math.ceil(math.log2(count))
 
 
-def slackened(nuisances: Nuisances, share: float) -> ProcessNoise:
-    """Process noise that also forgives an unmodelled force of `share` of the elastic force."""
+def slackened(nuisances: Nuisances, share: float) -> np.ndarray:
+    """Process noise (dof, dof) that also forgives an unmodelled force of `share` of the elastic force."""
     if isinstance(nuisances.fine, Imposed):
         size = share * np.max(nuisances.spread[nuisances.judged])
-        return ProcessNoise(size**2 * np.eye(nuisances.fine.a.shape[1]))
+        return size**2 * np.eye(nuisances.fine.a.shape[1])
     size = share * nuisances.omega**2 * nuisances.length
     forgiven, known = size**2 / nuisances.omega * nuisances.record.dt, np.asarray(nuisances.noise.velocity)
-    return ProcessNoise(known + forgiven * np.eye(len(known)))
+    return known + forgiven * np.eye(len(known))
 
 
 def prior(unknowns: Sequence[Unknown], theta: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
