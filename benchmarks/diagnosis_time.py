@@ -337,6 +337,12 @@ def main() -> None:
         return
 
     results: dict[str, dict[str, Any]] = {}
+    written = {"jax": jax.__version__, "cores": os.cpu_count(), "rows": results}
+
+    def write() -> None:
+        if given.json:
+            given.json.write_text(json.dumps(written, indent=1))
+
     for row in given.rows:
         if row in NEEDS and not (path := getattr(where, NEEDS[row])).exists():
             print(f"{row}: left out, {path} is not there", flush=True)
@@ -344,17 +350,14 @@ def main() -> None:
         results[row] = compare(row, where)
         cold = results[row]["cold"]
         print(f"{row}: {cold.get('said') or cold['failed']}", flush=True)
-    lengths = None
+        write()
+    print("\n" + table(results))
     if given.lengths:
         with tempfile.TemporaryDirectory(prefix="jfsm-programs-") as programs:
-            lengths = in_process(["--measure", "lengths"], programs)
-    print("\n" + table(results))
-    if lengths is not None:
+            written["lengths"] = lengths = in_process(["--measure", "lengths"], programs)
         told = "{settled_gb:.2f} GB after the tenth, {last_gb:.2f} GB after the last, {growth:+.0%}"
         print(f"\n{len(LENGTHS)} records of as many lengths: {lengths.get('failed') or told.format(**lengths)}")
-    if given.json:
-        written = {"jax": jax.__version__, "cores": os.cpu_count(), "rows": results, "lengths": lengths}
-        given.json.write_text(json.dumps(written, indent=1))
+        write()
 
 
 if __name__ == "__main__":
