@@ -1,7 +1,6 @@
 """Settings and fixtures of the whole suite: double precision, no silent broadcasting across ranks, seeded keys."""
 
 import os
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,20 +8,26 @@ import jax
 import pytest
 from jaxtyping import Array, Key
 
+from jfsm._programs import make_room
+
 MOST_MAPS = 25_000
+MOST_KEPT = 2_000_000_000
 
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """One store of compiled programs for all processes of a run, and one thread of linear algebra for each."""
+    """One store of compiled programs for all processes and for the next run, one thread of linear algebra for each."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    if "JAX_COMPILATION_CACHE_DIR" not in os.environ and not hasattr(config, "workerinput"):
-        store = tempfile.TemporaryDirectory(prefix="jfsm-programs-")
-        os.environ["JAX_COMPILATION_CACHE_DIR"] = store.name
-        os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.2")
-        config.add_cleanup(store.cleanup)
+    if "JAX_COMPILATION_CACHE_DIR" in os.environ or hasattr(config, "workerinput"):
+        return
+    store = config.cache.mkdir("programs")
+    make_room(store, MOST_KEPT)
+    kept = {"jax_compilation_cache_dir": str(store), "jax_persistent_cache_min_compile_time_secs": 0.2}
+    for name, value in kept.items():
+        os.environ[name.upper()] = str(value)  # for the processes that are started
+        jax.config.update(name, value)
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -17,6 +17,7 @@ ROOMS = (
     "_result",
     "_limit",
     "_threads",
+    "_programs",
     "reporting",
     "records",
     "structures",

@@ -8,14 +8,11 @@ from collections.abc import Callable
 from typing import Any
 
 import typer
-from platformdirs import user_cache_path
 
+from .._programs import settings
 from ._output import say
 
 FOUND, BAD_INPUT, NOT_FINISHED = 1, 2, 3
-
-_WORTH_KEEPING = "0.2"
-"""Seconds of compilation from which a program is kept for the next call."""
 
 app = typer.Typer(
     help="What a simulation gets wrong against a measured record, the name of the cause, and the gain of mending it.",
@@ -57,8 +54,8 @@ def _settle_jax() -> None:
         return
     # Read when it is loaded.
     os.environ["JAX_ENABLE_X64"] = "1"
-    os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(user_cache_path("jfsm")))
-    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", _WORTH_KEEPING)
+    for name, value in settings().items():
+        os.environ.setdefault(name.upper(), str(value))
 
 
 def _is_refusal(error: Exception) -> bool:

@@ -7,6 +7,7 @@ from functools import partial
 import jax
 
 from .._limit import Limit, ended_by_interrupt
+from .._programs import programs_kept
 from .._types import require_x64
 from ..dynamics import Reconstruction
 from ..identification import Nuisances
@@ -46,6 +47,7 @@ _ROUNDS = 3
 """Times that a record is looked into, at most, in which channels turn out to be late by less than a sample."""
 
 
+@programs_kept()
 def diagnose(
     record: Record | Sequence[Record],
     model: Structure,
@@ -105,6 +107,12 @@ def diagnose(
         If the record cannot be used, does not fit the model, or an argument is out of its range.
     KeyboardInterrupt
         If it is interrupted before the model itself was fitted, or for the second time.
+
+    Notes
+    -----
+    Most of the time of a first diagnosis is compilation. Programs are therefore kept on disk, up to 500 MB in the
+    user's cache folder, or in the folder that ``jax_compilation_cache_dir`` names; none are if JAX is told so
+    (``jax.config.update("jax_enable_compilation_cache", False)``).
     """
     require_x64()
     if max_causes < 1:

@@ -9,6 +9,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from .._programs import programs_kept
 from .._types import evenly_taken
 from ..estimation import RestoringForce, estimate_force_map, restoring_force
 from ..records import Record
@@ -96,6 +97,7 @@ class MappedForce:
         write_text_atomically(path, render_force_map(self.data))
 
 
+@programs_kept()
 def map_force(
     record: Record,
     model: Structure | None = None,

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from .._programs import programs_kept
 from .._types import require_x64
 from ..reporting import write_text_atomically
 from ._cases import section_4
@@ -59,6 +60,7 @@ class Study:
         return written
 
 
+@programs_kept()
 def study(
     sections: Sequence[str] | None = None,
     progress: Tell = lambda what, done, total: None,
