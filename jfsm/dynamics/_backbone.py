@@ -8,6 +8,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
+from .._programs import programs_kept
 from .._result import Result
 from .._types import as_array, require_x64
 from ..structures import Structure
@@ -39,6 +40,7 @@ class Backbone:
     result: Result
 
 
+@programs_kept()
 def backbone(
     model: Structure, amplitudes: Any, at: int = 1, mode: int = 1, harmonics: int = 7, *, around: Any = None
 ) -> Backbone:

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.optimize import brentq
 
+from .._programs import programs_kept
 from .._result import Result
 from .._types import require_x64
 from ..structures import Structure
@@ -65,6 +66,7 @@ class ForcedResponse:
         return tables(harmonics, samples)[0] @ self.coefficients[point]
 
 
+@programs_kept()
 def forced_response(
     model: Structure,
     amplitude: float,

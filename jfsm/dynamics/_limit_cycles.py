@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 from scipy.interpolate import KroghInterpolator
 from scipy.optimize import brentq
 
+from .._programs import programs_kept
 from .._types import as_array, require_x64
 from ..structures import Structure
 from ._field import Field, autonomous_field
@@ -98,6 +99,7 @@ class Rest(NamedTuple):
     eigenvalues: np.ndarray
 
 
+@programs_kept()
 def limit_cycles(model: Structure, starts: Any = None, *, force: Any = None) -> tuple[LimitCycle, ...]:
     """Isolated closed orbits of a structure left to itself, by rising amplitude.
 

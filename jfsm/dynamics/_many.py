@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from .._programs import programs_kept
 from .._threads import side_by_side
 from .._types import as_array, require_x64
 from ..records import Record
@@ -54,6 +55,7 @@ class Responses:
     escape_time: np.ndarray
 
 
+@programs_kept()
 def simulate_many(
     models: Structure | Sequence[Structure],
     record: Record,

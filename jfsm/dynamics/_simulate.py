@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from .._programs import programs_kept
 from .._result import Result
 from .._types import as_numbers, is_traced, known, require_x64
 from ..records import Record
@@ -134,6 +135,7 @@ class Response:
         return found
 
 
+@programs_kept()
 def simulate(
     model: Structure,
     record: Record,

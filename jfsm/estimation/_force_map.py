@@ -10,6 +10,7 @@ from jaxtyping import Float
 from scipy.optimize import minimize
 from scipy.spatial import KDTree
 
+from .._programs import programs_kept
 from .._types import as_scalar, require_x64
 from ..dynamics._excitation import bucket
 from ..records import Record, noise_floor
@@ -40,6 +41,7 @@ SETTLED, PASSES = 1e-3, 12
 """Change of the motion, in its standard deviations, at which passes of the smoother end, and most of them."""
 
 
+@programs_kept()
 def estimate_force_map(
     record: Record,
     mass: Any,

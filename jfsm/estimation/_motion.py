@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from .._programs import programs_kept
 from .._types import require_x64
 from ..dynamics import lower
 from ..dynamics._plant import direction
@@ -73,6 +74,7 @@ class Motion:
         return np.sqrt(np.maximum(np.diagonal(self.covariance, axis1=2, axis2=3), 0.0))
 
 
+@programs_kept()
 def estimate_motion(
     record: Record, model: Structure | None = None, places: Sequence[tuple[int, int]] | None = None
 ) -> Motion:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from .._programs import programs_kept
 from .._types import as_scalar, require_x64
 from ..dynamics._plant import direction
 from ..records import Record
@@ -42,6 +43,7 @@ class RestoringForce:
     lacking: bool
 
 
+@programs_kept()
 def restoring_force(
     record: Record, model: Structure | None = None, mass: float | None = None, at: Place | None = None
 ) -> RestoringForce:

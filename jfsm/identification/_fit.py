@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .._programs import programs_kept
 from .._result import Result
 from .._threads import side_by_side
 from .._types import require_x64
@@ -63,6 +64,7 @@ class Fit:
     result: Result
 
 
+@programs_kept()
 def fit(
     model: Structure,
     record: Record | Sequence[Record],
