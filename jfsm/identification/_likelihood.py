@@ -267,7 +267,11 @@ def _run(
 
     def begin() -> State:
         force, base, time = jnp.moveaxis(stretch.force[0], 1, 0), stretch.base[0], stretch.time[0]
-        return on_lanes(plants)(lambda *one: begun(*one, base, time, dt), assumed, x0, v0, force)
+
+        def one(plant, assumed, x0, v0, force):
+            return begun(plant, assumed, x0, v0, force, base, time, dt)
+
+        return on_lanes(plants)(one, assumed, x0, v0, force)
 
     state = jax.lax.cond(first, begin, lambda: state)
     return run(plants, assumed, show, stretch, dt, state, one_kernel=one_kernel)
