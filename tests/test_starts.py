@@ -273,7 +273,7 @@ def test_records_of_similar_length_share_the_programs_that_place_a_law(caplog):
     first = placed(1200)
     with caplog.at_level("WARNING", "jax"), jax.log_compiles():
         second = placed(1150)
-    large = ("_along_each", "_likelihoods", "_smooth", "force_along")
+    large = ("_at_once", "_remembered", "_likelihoods", "_smooth", "force_along")
     assert not [m for m in caplog.messages if m.startswith("Compiling") and any(name in m for name in large)]
     assert second[0].share == pytest.approx(first[0].share, abs=0.05)
 
