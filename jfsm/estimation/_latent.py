@@ -9,7 +9,7 @@ inside r, and is taken off afterwards. This is for pictures and maps, not for th
 
 from dataclasses import dataclass
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -130,7 +130,11 @@ def latent_force(
     _, model, swell = max(even, *swelling, key=lambda found: found[0])
     mean, std = (np.asarray(out) for out in _smooth(model, *data, swell))
     x, v, r = mean[:, :dof], mean[:, dof : 2 * dof], mean[:, 2 * dof :]
-    known = np.asarray(force_along(plant, x, v, fine.time[:padded])) if plant.laws else np.zeros_like(x)
+    known = (
+        np.asarray(force_along(plant, jnp.asarray(x), jnp.asarray(v), fine.time[:padded]))
+        if plant.laws
+        else np.zeros_like(x)
+    )
     x, v, r, known, std = (q[:n] for q in (x, v, r, known, std))
     moves = maximum_filter1d(np.abs(v), period, axis=0) > _CERTAIN * std[:, dof : 2 * dof]
     return Latent(x, v, r - known, std[:, 2 * dof :], np.any(moves, 1))
@@ -186,7 +190,9 @@ def _model(
     )
     sizes = np.concatenate([np.full(dof, length), np.full(dof, length * omega), amplitude * mass])
     start = np.diag((_WIDE * sizes) ** 2)
-    return _Model(LinearModel(step, noise, rows, variance, start, wander), carried, through)
+    arrays: Any = step, noise, rows, variance, start, wander  # of NumPy, to go to the device together
+    drive: Any = carried, through
+    return _Model(LinearModel(*arrays), *drive)
 
 
 def _driven(model: _Model, force, values):
