@@ -381,3 +381,13 @@ def test_the_interval_of_a_coefficient_holds_what_is_not_known_of_its_exponent(p
     value, low, high = interval(unknowns, theta, covariance, POWER[0])
     assert value == pytest.approx(0.4)
     np.testing.assert_allclose(np.log([low, high]), np.log(np.quantile(coefficient, [0.025, 0.975])), atol=0.03)
+
+
+def test_the_noise_of_the_force_moves_the_masses_that_a_record_is_weighed_with(single_nuisances):
+    known, mass = single_nuisances, float(SINGLE.mass[0])
+    heavier = jfsm.Structure([2.0 * mass], SINGLE.terms)
+    seen, anew = known.weighed(heavier), prepare(known.record, heavier)
+    np.testing.assert_allclose(seen.readings.variance, anew.readings.variance, rtol=1e-12)
+    assert np.sum(seen.readings.variance < known.readings.variance) == 1  # that of the acceleration
+    less = known.noise.velocity - seen.noise.velocity
+    np.testing.assert_allclose(less, 0.75 * known.force_covariance * (DT / mass) ** 2, rtol=1e-9)

@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 import jfsm
 from jfsm.dynamics import lower
 from jfsm.dynamics._along import force_along
+from jfsm.dynamics._law_along import forces_of_law
 from jfsm.dynamics._start import starting_state
 from jfsm.estimation import Latent
 from jfsm.identification import about_a_rest, missing_force, place, prepare, scale_of, starts
@@ -209,6 +210,8 @@ def test_the_force_along_a_given_motion_is_that_of_the_law(term, expected):
     x, v = np.cos(1.3 * T), -1.3 * np.sin(1.3 * T)
     plant = lower(jfsm.Structure([1.0], [term]))
     found = np.asarray(force_along(plant, jnp.asarray(x[:, None]), jnp.asarray(v[:, None]), jnp.asarray(T)))[:, 0]
+    alone = forces_of_law(type(term), np.array([term.values], dtype=float), x, v, T)
+    np.testing.assert_allclose(alone, found[None], rtol=1e-12, atol=1e-12)
     if expected is None:  # settled: amplitude and phase of z' = w - z/tau
         response = 2.0 * np.real(1j * 1.3 / (1j * 1.3 + 2.0) * np.exp(1j * 1.3 * T))
         np.testing.assert_allclose(found[200:], response[200:], atol=5e-3)
@@ -273,7 +276,7 @@ def test_records_of_similar_length_share_the_programs_that_place_a_law(caplog):
     first = placed(1200)
     with caplog.at_level("WARNING", "jax"), jax.log_compiles():
         second = placed(1150)
-    large = ("_along_each", "_likelihoods", "_smooth", "force_along")
+    large = ("_lot_at_once", "_remembered", "_likelihoods", "_smooth", "force_along")
     assert not [m for m in caplog.messages if m.startswith("Compiling") and any(name in m for name in large)]
     assert second[0].share == pytest.approx(first[0].share, abs=0.05)
 

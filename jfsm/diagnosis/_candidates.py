@@ -233,7 +233,7 @@ class Laws:
 
     def forces(self, terms: Sequence[AbstractTerm]) -> np.ndarray:
         """Forces (terms, n, dof) of shapes of one law along the smoothed motion."""
-        return forces_of(terms, self.missing, self.structure, self.nuisances)
+        return forces_of(terms, self.missing, self.nuisances)
 
     def together(self, effects: Sequence[Effect], pairs: Sequence[tuple[int, int]]) -> list[PlacedTogether]:
         """The best shapes of each of these `pairs` of laws, those first that explain most together."""

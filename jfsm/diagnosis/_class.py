@@ -1,9 +1,8 @@
 """What class a law belongs to: what a record tells even where it does not tell the law."""
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
+from ..dynamics._law_along import force_at
 from ..structures import AbstractSensor, AbstractTerm, Cause
 from ._shape import bent, growth
 
@@ -33,15 +32,11 @@ def class_of(cause: Cause, part: AbstractTerm | AbstractSensor, peak: float = 1.
     """
     if cause.family in _OF_FAMILY or not isinstance(part, AbstractTerm):
         return _OF_FAMILY.get(cause.family, _OF_FAMILY["sensor"])
-    axis, zero = jnp.linspace(-1.0, 1.0, _POINTS), jnp.zeros(())
-    force = jax.vmap(lambda d, w: part.force(d, w, (), zero))
-    along = {
-        "displacement": np.asarray(force(peak * axis, 0 * axis)),
-        "velocity": np.asarray(force(0 * axis, speed * axis)),
-    }
-    over = np.asarray(jax.vmap(lambda d: force(jnp.full(_POINTS, d), speed * axis))(peak * axis))
+    u = np.linspace(-1.0, 1.0, _POINTS)
+    d, w = (a.ravel() for a in np.meshgrid(peak * u, speed * u, indexing="ij"))
+    along = {"displacement": force_at(part, peak * u, 0 * u), "velocity": force_at(part, 0 * u, speed * u)}
+    over = force_at(part, d, w).reshape(_POINTS, _POINTS)
     mixed = over - along["displacement"][:, None] - along["velocity"][None, :] + over[_POINTS // 2, _POINTS // 2]
-    u = np.asarray(axis)
     parts = {name: bent(u, *_odd_and_even(values)) for name, values in along.items()}
     power = {name: float(np.var(odd) + np.var(even)) for name, (odd, even) in parts.items()}
     leading = max(power, key=lambda name: power[name])

@@ -14,12 +14,12 @@ from functools import partial
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from .._result import Result
 from .._threads import side_by_side
 from ..dynamics import simulate
+from ..dynamics._law_along import force_at
 from ..identification import LADDER, Nuisances, approach, finish, lanes_of, prepare
 from ..records import Record
 from ..structures import AbstractTerm, Structure
@@ -205,13 +205,11 @@ def same_force(one: Trial, other: Trial, nuisances: Nuisances) -> bool:
     if not (one.laws and other.laws) or any(law.states or law.timed or law.delay is not None for law in laws):
         return False
     farthest = max(_LEVELS) * nuisances.crest * nuisances.length
-    side = jnp.linspace(-1.0, 1.0, _SIDE)
-    d, w = (a.ravel() for a in jnp.meshgrid(farthest * side, farthest * nuisances.omega * side))
+    side = np.linspace(-1.0, 1.0, _SIDE)
+    d, w = (a.ravel() for a in np.meshgrid(farthest * side, farthest * nuisances.omega * side))
 
     def force(terms: Sequence[AbstractTerm]) -> np.ndarray:
-        zero = jnp.zeros(())
-        each = [jax.vmap(lambda d, w, term=term: term.force(d, w, (), zero))(d, w) for term in terms]
-        return np.asarray(sum(each, jnp.zeros(d.shape)))
+        return sum((force_at(term, d, w) for term in terms), np.zeros(d.size))
 
     # A device without a mass is judged by its force itself.
     masses = [float(np.ravel(t.structure.mass)[0]) or 1.0 for t in (one, other)]

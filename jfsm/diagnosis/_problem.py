@@ -38,12 +38,13 @@ class Problem(NamedTuple):
 
     def weighed(self, structure: Structure) -> "Problem":
         """The same, the noise of its forces acting through the masses of another structure."""
-        return self.of([n.record for n in self.records], structure)
+        return self._replace(records=[n.weighed(structure) for n in self.records])
 
     def of(self, records: Sequence[Record], weighed: Structure) -> "Problem":
         """The same of other records of the same channels, seen as those that they stand for."""
-        prepared = prepare_all(records, self.model, self.first.reconstruction, weighed=weighed)
-        return self._replace(records=[n.knowing(known) for n, known in zip(prepared, self.records, strict=True)])
+        prepared = prepare_all(records, self.model, self.first.reconstruction)
+        both = zip(prepared, self.records, strict=True)
+        return self._replace(records=[n.weighed(weighed).knowing(known) for n, known in both])
 
     def knowing(self, other: "Problem") -> "Problem":
         """The same, with what another problem of the same channels tells of these."""

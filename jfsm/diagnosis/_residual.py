@@ -4,11 +4,10 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from .._types import evenly_taken
+from ..dynamics._law_along import force_at
 from ..dynamics._plant import direction
 from ..identification import Nuisances, missing_force
 from ..structures import AbstractTerm, Structure
@@ -97,9 +96,7 @@ def agreement(found: Residual, term: AbstractTerm | None) -> float | None:
         return None
     take = evenly_taken(found.force.size, _NODES)
     d, w = found.displacement[take], found.velocity[take]
-    zero = jnp.zeros(())
-    law = jax.vmap(lambda d, w: term.force(d, w, (), zero))(jnp.asarray(d), jnp.asarray(w))
-    apart = np.asarray(law) - np.asarray(found.force_map.evaluate(np.column_stack([d, w])))
+    apart = force_at(term, d, w) - np.asarray(found.force_map.evaluate(np.column_stack([d, w])))
     lines = np.column_stack([np.ones_like(d), d, w])
     apart -= lines @ np.linalg.lstsq(lines, apart, rcond=None)[0]
     return float(np.mean(np.abs(apart) <= 2 * found.std[take]))
@@ -115,9 +112,7 @@ def curves(found: Residual, units, term: AbstractTerm | None) -> dict[str, Any]:
     if found.force_map is not None:
         drawn["map"] = shown_map(found.force_map, x, v)
     if term is not None and not term.states and term.delay is None:
-        zero = jnp.zeros(())
-        along_x = [float(term.force(d, zero, (), zero)) for d in jnp.asarray(x)]
-        along_v = [float(term.force(zero, w, (), zero)) for w in jnp.asarray(v)]
+        along_x, along_v = force_at(term, x, np.zeros_like(x)).tolist(), force_at(term, np.zeros_like(v), v).tolist()
         drawn["law"] = {
             "displacement": x.tolist(), "force_of_displacement": along_x,
             "velocity": v.tolist(), "force_of_velocity": along_v,

@@ -113,6 +113,10 @@ def substeps_for(structure: Structure, dt: float, size: Size | None = None) -> i
 
 def _fastest_rate(plant: Plant, x: np.ndarray, v: np.ndarray) -> float:
     """Largest eigenvalue [rad/s] of a plant's motion about a state; friction that sticks is left out."""
+    if not len(plant.smooth) + len(plant.memory) + len(plant.maps):
+        into, zero, eye = np.linalg.inv(plant.mass), np.zeros((plant.dof,) * 2), np.eye(plant.dof)
+        rate = np.block([[zero, eye], [-into @ plant.stiffness, -into @ plant.damping]])
+        return float(np.max(np.abs(np.linalg.eigvals(rate))))
     return float(np.max(np.abs(np.linalg.eigvals(np.asarray(relaxed_jacobian(plant, x, v))))))
 
 

@@ -149,6 +149,11 @@ class Plant(eqx.Module):
         return known and not self.maps and not len(self.delayed)
 
     @property
+    def laws(self) -> int:
+        """Number of terms beside the linear springs and dashpots."""
+        return sum(map(len, (self.smooth, self.friction, self.memory, self.delayed, self.maps)))
+
+    @property
     def hidden(self) -> int:
         """Number of hidden states."""
         return len(self.memory) * hidden_width(self.memory)

@@ -62,15 +62,15 @@ def _least_squares(model: Structure, head: Record, reconstruction: Reconstructio
     padded = bucket(len(head))
     substeps = substeps_for(model, head.dt, typical_size(head))
     fine = excitation(head, model.dof, substeps, reconstruction, length=padded)
-    counted = jnp.asarray(np.arange(padded) < len(head), dtype=jnp.float64)
+    counted = (np.arange(padded) < len(head)).astype(float)
     plant, show = lower(model, channels, grid=Grid(head.dt, substeps), rolled=True), readout(channels, model.dof)
     offset = y - np.asarray(plant.channel_offset)
     state = np.zeros(2 * model.dof)
     for i, (kind, j) in enumerate(channels):  # a measured channel is its own best first guess
         if kind in ("displacement", "velocity"):
             state[(j - 1) + (model.dof if kind == "velocity" else 0)] = offset[0, i]
-    readings = jnp.asarray(np.pad(y, ((0, padded - len(head)), (0, 0))))
-    known = plant, show, fine, readings, jnp.asarray(spread), counted
+    readings = np.pad(y, ((0, padded - len(head)), (0, 0)))
+    known = plant, show, fine, readings, spread, counted
     _, state = min((_descended(known, begin) for begin in (state, *_rests(model, channels))), key=lambda end: end[0])
     return state[: model.dof], state[model.dof :]
 
@@ -87,7 +87,7 @@ def _descended(known: tuple, state: np.ndarray) -> tuple[float, np.ndarray]:
     plant, show, fine, readings, spread, counted = known
     damp, best = 1e-6, None
     for _ in range(_ITERATIONS):
-        residual, slope = _residuals(plant, show, fine, readings, spread, counted, jnp.asarray(state))
+        residual, slope = _residuals(plant, show, fine, readings, spread, counted, state)
         residual, slope = np.asarray(residual), np.asarray(slope)
         cost = float(residual @ residual) if np.all(np.isfinite(residual)) else np.inf
         if best is None or cost < best[0]:

@@ -9,7 +9,7 @@ inside r, and is taken off afterwards. This is for pictures and maps, not for th
 
 from dataclasses import dataclass
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -108,18 +108,18 @@ def latent_force(
         )
         for tau, share in product(_MEMORIES, _AMPLITUDES)
     ]
-    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *models)
-    data = (jnp.asarray(true), jnp.asarray(seen), jnp.asarray(use))
+    stacked = jax.tree.map(lambda *leaves: np.stack(leaves), *models)
+    data = (true, seen, use)
     dof = plant.dof
     period = max(int(2 * np.pi / (omega * dt)), 1)
 
     def most_likely(swell: np.ndarray) -> tuple[float, _Model, np.ndarray]:
-        likelihoods = np.asarray(_likelihoods(stacked, *data, jnp.asarray(swell)))
+        likelihoods = np.asarray(_likelihoods(stacked, *data, swell))
         best = int(np.nanargmax(likelihoods))
         return float(likelihoods[best]), models[best], swell
 
     _, model, swell = even = most_likely(np.ones(padded))
-    mean, _ = (np.asarray(out) for out in _smooth(model, *data, jnp.asarray(swell)))
+    mean, _ = (np.asarray(out) for out in _smooth(model, *data, swell))
     energy = np.mean(mean[:n, :dof] ** 2 + (mean[:n, dof : 2 * dof] / omega) ** 2, 1)
     energy = gaussian_filter1d(energy, period, mode="nearest")
     swelling = [
@@ -128,9 +128,13 @@ def latent_force(
         if np.any(energy > 0)
     ]
     _, model, swell = max(even, *swelling, key=lambda found: found[0])
-    mean, std = (np.asarray(out) for out in _smooth(model, *data, jnp.asarray(swell)))
+    mean, std = (np.asarray(out) for out in _smooth(model, *data, swell))
     x, v, r = mean[:, :dof], mean[:, dof : 2 * dof], mean[:, 2 * dof :]
-    known = np.asarray(force_along(plant, jnp.asarray(x), jnp.asarray(v), fine.time[:padded]))
+    known = (
+        np.asarray(force_along(plant, jnp.asarray(x), jnp.asarray(v), fine.time[:padded]))
+        if plant.laws
+        else np.zeros_like(x)
+    )
     x, v, r, known, std = (q[:n] for q in (x, v, r, known, std))
     moves = maximum_filter1d(np.abs(v), period, axis=0) > _CERTAIN * std[:, dof : 2 * dof]
     return Latent(x, v, r - known, std[:, 2 * dof :], np.any(moves, 1))
@@ -163,8 +167,12 @@ def _model(
     weight = (
         dt / (6 * substeps) * np.array([1.0 if j in (0, nodes - 1) else 4.0 if j % 2 else 2.0 for j in range(nodes)])
     )
-    carried = np.array([w * scipy.linalg.expm(rate * dt * (1 - j / (nodes - 1))) @ gain for j, w in enumerate(weight)])
-    step = scipy.linalg.expm(rate * dt)
+    onward = [np.eye(n)]
+    short = scipy.linalg.expm(rate * dt / (nodes - 1))
+    for _ in range(nodes - 1):
+        onward.append(onward[-1] @ short)
+    carried = weight[:, None, None] * (np.array(onward[::-1]) @ gain)
+    step = onward[-1]
     mass = np.diag(np.asarray(plant.mass))
     noise = np.zeros((n, n))
     noise[dof : 2 * dof, dof : 2 * dof] = minv @ (force_covariance * dt**2) @ minv.T
@@ -182,8 +190,9 @@ def _model(
     )
     sizes = np.concatenate([np.full(dof, length), np.full(dof, length * omega), amplitude * mass])
     start = np.diag((_WIDE * sizes) ** 2)
-    linear = LinearModel(*(jnp.asarray(a) for a in (step, noise, rows, variance, start, wander)))
-    return _Model(linear, jnp.asarray(carried), jnp.asarray(through))
+    arrays: Any = step, noise, rows, variance, start, wander  # of NumPy, to go to the device together
+    drive: Any = carried, through
+    return _Model(LinearModel(*arrays), *drive)
 
 
 def _driven(model: _Model, force, values):

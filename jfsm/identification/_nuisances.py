@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -42,6 +42,30 @@ _LOUD = 0.25
 """where their power is such a share of that of all, at least."""
 
 
+class DrivingNoise(NamedTuple):
+    """Noise of what drives, before any mass is moved by it.
+
+    `by_sample` (dof,) is the variance that smoothing leaves in a sample of the force; `in_motion` (dof,), and `base`
+    for the acceleration of the base, that of white noise as strong as what it leaves where the structure moves.
+    """
+
+    by_sample: np.ndarray
+    in_motion: np.ndarray
+    base: float
+
+    def on(self, mass: np.ndarray) -> np.ndarray:
+        """Covariance (dof, dof) of the white forces on these masses: a base moves all through their inertia."""
+        inertia = mass.sum(1)
+        return np.diag(self.in_motion) + self.base * np.outer(inertia, inertia)
+
+    def shown_by(self, channels: tuple[Channel, ...], floor: np.ndarray, mass: np.ndarray) -> np.ndarray:
+        """Variance (channels,) of readings of such noise floors: an acceleration is predicted with the force's own
+        noise, less what smoothing took."""
+        accelerates = np.array([kind == "acceleration" for kind, _ in channels])
+        at = [j - 1 for _, j in channels]
+        return floor**2 + np.where(accelerates, self.by_sample[at] / np.diag(mass)[at] ** 2, 0.0)
+
+
 @dataclass(frozen=True)
 class Nuisances:
     """One record as the likelihood sees it; the same object for all hypotheses.
@@ -59,6 +83,8 @@ class Nuisances:
         Standard deviation of the white noise of the force's samples.
     base_floor : float
         That of the acceleration of the base.
+    driving : DrivingNoise
+        Both as smoothing leaves them, whatever masses they move.
     force_covariance : (dof, dof) array
         White noise on the masses as strong as what smoothing leaves of both where the structure moves.
     floor : (channels,) array
@@ -87,6 +113,7 @@ class Nuisances:
     fine: Fine | Imposed
     readings: Readings
     noise: ProcessNoise
+    driving: DrivingNoise
     force_floor: np.ndarray
     base_floor: float
     force_covariance: np.ndarray
@@ -207,6 +234,19 @@ class Nuisances:
         seen = self if other.colour is None else self.with_colour(other.colour)
         return seen.with_wandering(other.readings.wandering)
 
+    def weighed(self, structure: Structure) -> "Nuisances":
+        """The same record, the noise of what drives it moving the masses of another structure."""
+        if self.path is not None:
+            return self
+        mass = _mass(structure)
+        covariance = self.driving.on(mass)
+        readings = replace(self.readings, variance=self.driving.shown_by(self.channels, self.floor, mass))
+        noise = _disturbance(mass, covariance, self.omega, self.length, self.record.dt)
+        if self.colour is not None:
+            readings, noise = self.colour.on(readings), self.colour.of_force(noise)
+            covariance = covariance * float(self.colour.louder)
+        return replace(self, readings=readings, noise=noise, force_covariance=covariance)
+
     def resolving(self, structures: Sequence[Structure], least: int = 1) -> "Nuisances":
         """The same record with steps short enough for all of these structures, so many per sample at `least`."""
         record, fine = self.record, self.fine
@@ -225,16 +265,8 @@ class Nuisances:
         )
 
 
-def prepare(
-    record: Record,
-    model: Structure,
-    reconstruction: Reconstruction = "band-limited",
-    *,
-    weighed: Structure | None = None,
-) -> Nuisances:
+def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "band-limited") -> Nuisances:
     """Nuisances of a record, scaled by the model as it is believed.
-
-    The noise of the force moves the masses of `weighed`, where these are known better than the model's.
 
     Raises
     ------
@@ -261,23 +293,18 @@ def prepare(
     base = None if record.base_acceleration is None else driving(record.base_acceleration, record.dt)
     omega = fastest_mode(lower(model)) or _rate(values[:, 0], record.dt)
     length, crest = _size(channels, values, spread, omega)
-    mass = _mass(weighed or model)
-    covariance = np.diag(force.in_motion)
-    if base is not None:  # it moves all masses alike, through their inertia
-        inertia = mass.sum(1)
-        covariance = covariance + base.in_motion * np.outer(inertia, inertia)
-    variance = floor**2
-    for i, (kind, j) in enumerate(channels):
-        if kind == "acceleration":  # an acceleration is predicted with the force's own noise, less what smoothing took
-            variance[i] += force.by_sample[j - 1] / mass[j - 1, j - 1] ** 2
+    mass = _mass(model)
+    noise = DrivingNoise(force.by_sample, force.in_motion, 0.0 if base is None else base.in_motion)
+    covariance = noise.on(mass)
     x0, v0 = _start(record, model, reconstruction, dict(zip(channels, values[0].tolist(), strict=True)))
     return Nuisances(
         record=record,
         channels=channels,
         show=readout(channels, model.dof),
         fine=_drive(record, model, reconstruction, force.samples, None if base is None else base.samples),
-        readings=_padded(values, seen.use, variance),
+        readings=_padded(values, seen.use, noise.shown_by(channels, floor, mass)),
         noise=_disturbance(mass, covariance, omega, length, record.dt),
+        driving=noise,
         force_floor=force.floor,
         base_floor=0.0 if base is None else base.floor,
         force_covariance=covariance,
@@ -297,11 +324,7 @@ def prepare(
 
 
 def prepare_all(
-    records: Sequence[Record],
-    model: Structure,
-    reconstruction: Reconstruction = "band-limited",
-    *,
-    weighed: Structure | None = None,
+    records: Sequence[Record], model: Structure, reconstruction: Reconstruction = "band-limited"
 ) -> list[Nuisances]:
     """`prepare` of several records, in all of which the same drives.
 
@@ -317,7 +340,7 @@ def prepare_all(
             f"`record` must hold records that agree in drive; number {other + 1} has {drives[other]}, not {drives[0]}. "
             "Judge them apart."
         )
-    return [prepare(record, model, reconstruction, weighed=weighed) for record in records]
+    return [prepare(record, model, reconstruction) for record in records]
 
 
 def _prepare_imposed(record: Record, model: Structure, reconstruction: Reconstruction) -> Nuisances:
@@ -349,6 +372,7 @@ def _prepare_imposed(record: Record, model: Structure, reconstruction: Reconstru
         fine=path.imposed(imposed_substeps(model, record.dt, typical_size(record)), bucket(len(record))),
         readings=_padded(values, use, floor**2),
         noise=ProcessNoise(still),
+        driving=DrivingNoise(none, none, 0.0),
         force_floor=none[:0],
         base_floor=0.0,
         force_covariance=np.zeros((model.dof, model.dof)),

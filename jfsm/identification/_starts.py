@@ -12,15 +12,13 @@ from functools import cached_property
 from itertools import compress
 from typing import NamedTuple
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
 from scipy.stats import qmc
 
-from ..dynamics._along import SUBSTEPS, force_along
+from ..dynamics._along import SUBSTEPS
 from ..dynamics._excitation import bucket
 from ..dynamics._imposed import Imposed
+from ..dynamics._law_along import forces_of_law
 from ..dynamics._needed import force_needed
 from ..dynamics._plant import Grid, Plant, direction, lower
 from ..estimation import Latent, latent_force
@@ -52,6 +50,14 @@ _ALMOST_NONE = 1e-6
 """Share of a law's power outside springs, dashpots and constants, below which it is none."""
 _MODEST = 0.05
 """Size of a law to begin with where the record does not tell one, as a share of the elastic force."""
+
+
+class _Motion(NamedTuple):
+    """Displacement and velocity (n, dof) at these times (n,), as many as others have too."""
+
+    x: np.ndarray
+    v: np.ndarray
+    time: np.ndarray
 
 
 class Placed(NamedTuple):
@@ -219,8 +225,7 @@ class Regression:
     """
 
     law: AbstractTerm
-    structure: Structure
-    motion: tuple[jax.Array, jax.Array, jax.Array]
+    motion: _Motion
     moves: np.ndarray
     missing: np.ndarray
     spread: np.ndarray
@@ -246,10 +251,10 @@ class Regression:
         if not np.all(np.abs(missing) < _NO_FORCE):
             return None
         spread = np.maximum(missing.std(0), 1e-300)
-        beside = [np.asarray(force_along(lower(Structure(structure.mass, [t])), *motion))[:n] for t in others]
+        beside = [_forces(t, np.array([t.values], dtype=float), motion)[0, :n] for t in others]
         basis, doubt = _basis(latent, structure, beside)
         basis = (basis[moves] / spread[:, None]).reshape(-1, len(doubt))
-        return cls(law, structure, motion, moves, missing, spread, basis, doubt, np.zeros((0, len(doubt))))
+        return cls(law, motion, moves, missing, spread, basis, doubt, np.zeros((0, len(doubt))))
 
     @property
     def wanted(self) -> np.ndarray:
@@ -262,7 +267,7 @@ class Regression:
 
     def columns(self, rows: list[dict[str, float]]) -> tuple[np.ndarray, list[dict[str, float]]]:
         """Forces (rows, samples x dof) of those shapes that do not run away along the motion, and these."""
-        forces, stable = _forces_of(self.law, rows, self.structure, self.motion, np.max(self.spread))
+        forces, stable = _forces_of(self.law, rows, self.motion, np.max(self.spread))
         forces, rows = forces[:, : len(self.moves)], list(compress(rows, stable))
         return (forces[stable][:, self.moves] / self.spread).reshape(len(rows), self.missing.size), rows
 
@@ -389,27 +394,27 @@ def _lots(kind: type[AbstractTerm], rows: list[dict[str, float]]):
         yield chunk, np.array([[row[p.name] for p in kind.parameters] for row in filled])
 
 
-def _still_afterwards(latent: Latent, time: np.ndarray) -> tuple[jax.Array, jax.Array, jax.Array]:
+def _still_afterwards(latent: Latent, time: np.ndarray) -> _Motion:
     """The smoothed motion, standing still from its end on, in a length that others share."""
     more = bucket(len(time)) - len(time)
     later = time[-1] + (time[-1] - time[-2]) * np.arange(1, more + 1)
     x = np.pad(latent.displacement, ((0, more), (0, 0)), "edge")
     v = np.pad(latent.velocity, ((0, more), (0, 0)))
-    return jnp.asarray(x), jnp.asarray(v), jnp.asarray(np.concatenate([time, later]))
+    return _Motion(x, v, np.concatenate([time, later]))
 
 
-def forces_of(terms: Sequence[AbstractTerm], latent: Latent, structure: Structure, nuisances: Nuisances) -> np.ndarray:
+def forces_of(terms: Sequence[AbstractTerm], latent: Latent, nuisances: Nuisances) -> np.ndarray:
     """Forces (terms, n, dof) of terms of one class at one place along a smoothed motion, no numbers where they run
     away."""
     n = len(latent.force)
     motion = _still_afterwards(latent, np.asarray(nuisances.record.time[:n]))
     rows = [dict(zip((p.name for p in t.parameters), map(float, t.values), strict=True)) for t in terms]
-    forces, stable = _forces_of(terms[0], rows, structure, motion, max(float(np.max(latent.force.std(0))), 1e-300))
+    forces, stable = _forces_of(terms[0], rows, motion, max(float(np.max(latent.force.std(0))), 1e-300))
     return np.where(stable[:, None, None], forces[:, :n], np.nan)
 
 
 def _forces_of(
-    law: AbstractTerm, rows: list[dict[str, float]], structure: Structure, motion, usual: float
+    law: AbstractTerm, rows: list[dict[str, float]], motion: _Motion, usual: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Forces (rows, n, dof) of a law's shapes along a motion, and which of them do not run away from a `usual` size.
 
@@ -418,7 +423,7 @@ def _forces_of(
 
     def of(rows: list[dict[str, float]], finer: int = 1) -> np.ndarray:
         lots = _lots(type(law), rows)
-        return np.concatenate([_forces(law, lot, structure, motion, finer)[: len(some)] for some, lot in lots])
+        return np.concatenate([_forces(law, lot, motion, finer)[: len(some)] for some, lot in lots])
 
     def stable(forces: np.ndarray) -> np.ndarray:
         return np.max(np.abs(forces), (1, 2)) < _RUN_AWAY * usual  # false for what is no number, too
@@ -430,25 +435,11 @@ def _forces_of(
     return forces, stable(forces)
 
 
-def _forces(law: AbstractTerm, numbers: np.ndarray, structure: Structure, motion, finer: int) -> np.ndarray:
+def _forces(law: AbstractTerm, numbers: np.ndarray, motion: _Motion, finer: int = 1) -> np.ndarray:
     """Forces (rows, n, dof) of a law along a motion for rows of its numbers."""
-    unit = type(law)(**dict(zip((p.name for p in law.parameters), numbers[0], strict=True)), at=law.at)
-    plant = lower(Structure(structure.mass, [unit]))
-    slots = {name: getattr(plant, name) for name in ("smooth", "friction", "memory", "delayed")}
-    name = next(name for name, slot in slots.items() if len(slot))
-    width = slots[name].parameters.shape[1]
-    padded = np.zeros((len(numbers), 1, width))
-    padded[:, 0, : numbers.shape[1]] = numbers
-    return np.asarray(_along_each(plant, name, jnp.asarray(padded), *motion, substeps=finer * SUBSTEPS))
-
-
-@eqx.filter_jit
-def _along_each(plant: Plant, name: str, numbers, x, v, time, *, substeps: int):
-    def one(row):
-        changed = eqx.tree_at(lambda p: getattr(p, name).parameters, plant, row)
-        return force_along(changed, x, v, time, substeps=substeps)
-
-    return jax.vmap(one)(numbers)
+    row = direction(law.at, motion.x.shape[1])
+    d, w = motion.x @ row, motion.v @ row
+    return forces_of_law(type(law), numbers, d, w, motion.time, substeps=finer * SUBSTEPS)[:, :, None] * row
 
 
 def _regressed(columns: np.ndarray, wanted: np.ndarray, q: np.ndarray):

@@ -69,14 +69,23 @@ def _fitted(
     y: NDArray[np.float64], phase: NDArray[np.float64], omega: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Sum (n,) of a constant and sines of these frequencies [rad per unit of `phase`], and a step (tones,) of those."""
-    angle = phase[:, None] * omega[None, :]
+    angle = np.outer(omega, phase)
     cosine, sine = np.cos(angle), np.sin(angle)
-    columns = np.hstack([np.ones((y.size, 1)), cosine, sine])
-    size = np.linalg.lstsq(columns, y, rcond=None)[0]
-    curve = columns @ size
+    rows = np.concatenate([np.ones((1, y.size)), cosine, sine])
+    size = _least_squares(rows, y)
+    curve = size @ rows
     if not omega.size:
         return curve, np.zeros(0)
-    a, b = size[1 : 1 + omega.size], size[1 + omega.size :]
-    slope = phase[:, None] * (b * cosine - a * sine)
-    step = np.linalg.lstsq(np.hstack([columns, slope]), y - curve, rcond=None)[0][-omega.size :]
-    return curve, np.clip(step, -np.pi, np.pi).astype(np.float64)
+    a, b = size[1 : 1 + omega.size, None], size[1 + omega.size :, None]
+    strength = np.maximum(np.hypot(a, b), np.finfo(float).tiny)
+    slope = phase * (b * cosine - a * sine) / strength
+    step = _least_squares(np.concatenate([rows, slope]), y - curve)[-omega.size :] / strength[:, 0]
+    return curve, np.clip(step, -np.pi, np.pi)
+
+
+def _least_squares(rows: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sizes (rows,) of rows (rows, n) of one size, told well apart, whose sum is nearest to `y` (n,)."""
+    # Of a few rows the products are soon formed; a second step leaves no more of their rounding than orthogonal rows.
+    inverse = np.linalg.pinv(rows @ rows.T, hermitian=True)
+    size = inverse @ (rows @ y)
+    return size + inverse @ (rows @ (y - size @ rows))

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..._types import is_traced
 from .._readings import check_rank, check_shapes, check_varied, reach_of
 from .basis import basis_size, chebyshev_polynomials
 
@@ -58,11 +59,14 @@ def prepare_nodes(states: Any, force: Any, order: int) -> Nodes:
     scale = states.std(axis=0)
     check_varied(states)
     check_determined(distinct, order)
-    total = jnp.zeros((len(counts), *force.shape[1:])).at[inverse.reshape(-1)].add(force)
-    multiplicity = jnp.asarray(counts, dtype=float)
-    mean = total / multiplicity.reshape(-1, *[1] * (force.ndim - 1))
+    total, multiplicity = np.zeros((len(counts), *force.shape[1:])), counts.astype(float)
+    if is_traced(force):
+        total = jnp.asarray(total).at[inverse.reshape(-1)].add(force)
+    else:
+        np.add.at(total, inverse.reshape(-1), np.asarray(force))
+    mean = jnp.asarray(total / multiplicity.reshape(-1, *[1] * (force.ndim - 1)))
     reach = reach_of(distinct / scale, basis_size(states.shape[1], min(order, REACH_ORDER)))
-    return Nodes(jnp.asarray(distinct), mean, multiplicity, jnp.asarray(scale), jnp.asarray(reach))
+    return Nodes(jnp.asarray(distinct), mean, jnp.asarray(multiplicity), jnp.asarray(scale), jnp.asarray(reach))
 
 
 def check_enough(distinct: np.ndarray, order: int) -> None:
