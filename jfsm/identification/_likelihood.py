@@ -164,10 +164,7 @@ def _filtered(scene: Scene, runs: Runs, count: int, found: Innovations) -> None:
     """Put in what a full set of lanes has `found`, or the first of them, a stretch of samples after the other."""
     plant, numbers = without_part(scene.plant, runs.numbers, "force_delay")  # the drive has it
     readings = scene.readings
-    noise = _Noise(
-        readings.variance, readings.wander, readings.colour, scene.doubt, readings.wandering, readings.coloured
-    )
-    leaves, static = jax.tree.flatten((plant, noise, scene.show))
+    leaves, static = jax.tree.flatten((plant, Noise.of(readings, scene.doubt), scene.show))
     drive, state = _Drive.of(scene, runs, count), _nowhere(plant, readings)
     fixed = jax.device_put((leaves, numbers, runs.velocity, np.asarray(drive.fine.step)))
     for begin in range(0, count, SAMPLES):
@@ -178,7 +175,7 @@ def _filtered(scene: Scene, runs: Runs, count: int, found: Innovations) -> None:
             whole[:, begin:end] = np.moveaxis(np.asarray(part), 1, 0)[: len(whole), : end - begin]
 
 
-class _Noise(eqx.Module):
+class Noise(eqx.Module):
     """What all lanes assume of noise, before their own factors on that of the channels."""
 
     variance: Float[Array, " channels"]
@@ -187,6 +184,10 @@ class _Noise(eqx.Module):
     doubt: Float[Array, " state"]
     wandering: tuple[int, ...] = eqx.field(static=True)
     coloured: tuple[int, ...] = eqx.field(static=True)
+
+    @classmethod
+    def of(cls, seen: Readings, doubt: Float[Array, " state"]) -> "Noise":
+        return cls(seen.variance, seen.wander, seen.colour, doubt, seen.wandering, seen.coloured)
 
     def assumed(self, log_scale: Float[Array, "lanes channels"], velocity: Float[Array, "lanes dof dof"]) -> Assumed:
         """That of all lanes."""
@@ -211,7 +212,7 @@ def _run(
 ) -> tuple[State, Innovations]:
     """State of all lanes after a stretch, and innovations (n, lanes, channels); the `first` one has no state yet.
 
-    `leaves` and `static` are a plant, `_Noise` and a readout.
+    `leaves` and `static` are a plant, `Noise` and a readout.
     """
     plant, noise, show = jax.tree.unflatten(static, leaves)
     floats, fixed = eqx.partition(plant, eqx.is_inexact_array)
@@ -220,7 +221,7 @@ def _run(
         return eqx.partition(with_vector(eqx.combine(floats, fixed), row), eqx.is_inexact_array)[0]
 
     plants = eqx.combine(jax.vmap(lane)(numbers), fixed)
-    x0, v0, log_scale = _tail(plant, numbers, noise.variance.size)
+    x0, v0, log_scale = tail_of(plant, numbers, noise.variance.size)
     assumed = noise.assumed(log_scale, velocity)
 
     def begin() -> State:
@@ -231,7 +232,7 @@ def _run(
     return run(plants, assumed, show, stretch, dt, state, one_kernel=one_kernel)
 
 
-def _tail(plant: Plant, numbers, channels: int):
+def tail_of(plant: Plant, numbers, channels: int):
     """x0, v0 and the logarithms of the factors on the channels' noise."""
     dof, tail = plant.dof, numbers[:, numbers.shape[1] - 2 * plant.dof - channels :]
     return tail[:, :dof], tail[:, dof : 2 * dof], tail[:, 2 * dof :]
@@ -296,7 +297,7 @@ def _along_motion(scene: Scene, runs: Runs, count: int, found: Innovations) -> N
 
 @eqx.filter_jit
 def _along(plant: Plant, numbers, show: Readout, fine: Imposed, readings: Readings, velocity, doubt) -> Innovations:
-    log_scale = _tail(plant, numbers, readings.values.shape[1])[2]
+    log_scale = tail_of(plant, numbers, readings.values.shape[1])[2]
 
     def one(numbers, velocity, log_scale):
         lane = with_vector(plant, numbers)

@@ -15,6 +15,7 @@ from ..structures import AbstractFriction, ChannelDelay, ForceDelay, Structure
 from ._colour import Colour
 from ._layout import plant_rows, plant_vector
 from ._likelihood import Runs, Scene, Slopes, innovations_of, value_and_slopes
+from ._linear_lanes import is_linear, linear_innovations
 from ._nuisances import Nuisances
 from ._unknowns import Unknown, values_of
 
@@ -149,7 +150,8 @@ class Posterior:
         scene = Scene(part.plant, nuisances.show, fine, readings, _doubt(part.plant, nuisances))
         padded = np.zeros(readings.use.shape)
         padded[:until] = use[:until]
-        return innovations_of(scene, Runs(part.numbers(theta[:, part.mine]), velocity, padded, push), until)
+        runs = Runs(part.numbers(theta[:, part.mine]), velocity, padded, push)
+        return (linear_innovations if is_linear(scene) else innovations_of)(scene, runs, until)
 
     def innovations(
         self,
