@@ -31,6 +31,8 @@ SAMPLES = 1024
 """Samples that a program runs at a time; fewer are padded, so that one program serves records of any length."""
 _BLOCKS = 64
 """Stretches of a record whose gradients count as independent of each other."""
+_PIECE = 256
+"""Columns of a product that one core is faster with."""
 _NUDGE = 1e-6
 """Change of an unknown that shows what it does."""
 _HANDFUL, _MOSTLY = 8, 0.5
@@ -64,7 +66,7 @@ class Slopes(NamedTuple):
     @property
     def information(self) -> np.ndarray:
         with np.errstate(all="ignore"):
-            return self.by_error @ self.by_error.T + 0.5 * self.by_spread @ self.by_spread.T
+            return _gram(self.by_error) + 0.5 * _gram(self.by_spread)
 
     @property
     def scatter(self) -> np.ndarray:
@@ -79,6 +81,16 @@ class Slopes(NamedTuple):
     @property
     def _by_variance(self) -> np.ndarray:
         return 0.5 * (self.root - self.error**2 / np.maximum(self.root, 1e-30))
+
+
+def _gram(rows: np.ndarray) -> np.ndarray:
+    """Products of rows (unknowns, n) with each other.
+
+    They are taken in pieces that BLAS gives to no threads, which wait for each other longer than they work; it would
+    whatever their size, were the second factor not a copy.
+    """
+    pieces = np.array_split(rows, max(rows.shape[1] // _PIECE, 1), 1)
+    return np.sum([piece @ piece.T.copy() for piece in pieces], 0)
 
 
 def value_and_slopes(run: Callable[[np.ndarray], Innovations], theta: np.ndarray, use: np.ndarray) -> Slopes:

@@ -130,9 +130,7 @@ def _law(
 
 
 @jax.jit
-def _follow(
-    law: Law, lanes: _Lanes, samples: _Samples, count: Int[Array, ""], course: Course
-) -> tuple[Course, Errors]:
+def _follow(law: Law, lanes: _Lanes, samples: _Samples, count: Int[Array, ""], course: Course) -> tuple[Course, Errors]:
     """Course after a stretch of `count` samples, and the errors of all lanes."""
     mine = jax.tree.map(lambda leaf: leaf[lanes.whose], law)
     g = (samples.force - lanes.force_offset) / (1.0 + lanes.force_gain)  # (n, halves, lanes, dof)
