@@ -133,9 +133,9 @@ def _law(
 def _follow(law: Law, lanes: _Lanes, samples: _Samples, count: Int[Array, ""], course: Course) -> tuple[Course, Errors]:
     """Course after a stretch of `count` samples, and the errors of all lanes."""
     mine = jax.tree.map(lambda leaf: leaf[lanes.whose], law)
-    g = (samples.force - lanes.force_offset) / (1.0 + lanes.force_gain)  # (n, halves, lanes, dof)
-    g = g - samples.base[:, :, None, None] * mine.inertia
+    gain, zero, inertia = (a[None, None] for a in (lanes.force_gain, lanes.force_offset, mine.inertia))
+    g = (samples.force - zero) / (1.0 + gain) - samples.base[:, :, None, None] * inertia
     moved = jnp.einsum("nhld,lhsd->nls", g, mine.push)
-    direct = jnp.einsum("nld,lcd->nlc", g[:, 0], mine.direct) + samples.base[:, :1, None] * mine.based
-    read = samples.values[:, None] - lanes.channel_offset - direct
+    direct = jnp.einsum("nld,lcd->nlc", g[:, 0], mine.direct) + samples.base[:, :1, None] * mine.based[None]
+    read = samples.values[:, None] - lanes.channel_offset[None] - direct
     return follow(law, lanes.whose, moved, read, samples.use, count, course)
