@@ -21,7 +21,7 @@ from ._filter import Assumed, Known, beside, short_transition, transition, zeros
 
 _SETTLED = 1e-12
 """Change of a covariance in a sample, in standard deviations, that is none. What is still to come is that times the
-samples that the filter remembers, some thousands at most."""
+samples that the filter remembers, thousands at most. Where little stirs the structure nothing settles."""
 
 
 class Law(NamedTuple):
