@@ -163,8 +163,8 @@ class Assumed(eqx.Module):
     def begin(self) -> Float[Array, "state state"]:
         """Covariance of all states at the first sample."""
         remembered = self.colour[:, 1] * self.variance[jnp.array(self.coloured, dtype=int)]
-        zeros = _beside(_about_slopes(self.wander[:, 0]), jnp.diag(remembered))
-        return _beside(self.start, zeros)
+        zeros = beside(_about_slopes(self.wander[:, 0]), jnp.diag(remembered))
+        return beside(self.start, zeros)
 
 
 def zeros_of(noise: Readings | Assumed) -> tuple[int | None, ...]:
@@ -228,8 +228,8 @@ class Known(NamedTuple):
         return cls(
             inverse_mass(plant),
             assumed.variance.at[picked].add(-remembered),
-            _beside(_ramps(len(assumed.wandering)), jnp.diag(memory)),
-            _beside(_about_slopes(assumed.wander[:, 1]), jnp.diag((1.0 - memory**2) * remembered)),
+            beside(_ramps(len(assumed.wandering)), jnp.diag(memory)),
+            beside(_about_slopes(assumed.wander[:, 1]), jnp.diag((1.0 - memory**2) * remembered)),
             struck @ assumed.velocity @ struck.T,
             _NOTHING * jnp.sqrt(speeds),
         )
@@ -257,9 +257,13 @@ def run(
     def loop(plants, known, show, dt, states, stretch):
         return jax.lax.scan(partial(_sample, on_lanes(plants), known, show, of_zeros, dt), states, stretch)
 
-    small = 2 * alone.dof + alone.hidden + len(of_zeros) <= _FEW and alone.elementary
-    run_all = as_one_kernel(loop) if one_kernel and small else loop
+    run_all = as_one_kernel(loop) if one_kernel and few_states(alone, of_zeros) else loop
     return run_all(plants, on_lanes(plants)(Known.of, assumed), show, dt, states, stretch)
+
+
+def few_states(plant: Plant, zeros: tuple[int | None, ...]) -> bool:
+    """Whether the loop over a plant's samples may be one kernel."""
+    return 2 * plant.dof + plant.hidden + len(zeros) <= _FEW and plant.elementary
 
 
 def _sample(each: Lanes, known: Known, show, of_zeros, dt, states: State, now: Stretch) -> tuple[State, Innovations]:
@@ -328,8 +332,8 @@ def _carried_on(plant: Plant, known: Known, motion: Motion, after: Motion, updat
     """Covariance of a lane after a sample, and how surely links rest by then; `g` drives it halfway."""
     x, v, z = ((a + b) / 2 for a, b in zip(motion[:3], after[:3], strict=True))
     free, rates = linearised(plant, known.minv, x, v, z, g, time + dt / 2)
-    step = _beside(_transition(plant, known.minv, motion, after, rates, dt, substeps), known.onward)
-    moving = _product(_product(step, updated), step.T) + _beside(known.added, known.stirred)
+    step = beside(_transition(plant, known.minv, motion, after, rates, dt, substeps), known.onward)
+    moving = _product(_product(step, updated), step.T) + beside(known.added, known.stirred)
     slope = with_friction(plant, known.minv, x, v, motion.mode, free, time + dt / 2)[0]
     return _rest(plant, known.minv, moving, after.mode), _overrun(plant, motion, after, moving, slope, dt)
 
@@ -368,7 +372,7 @@ def innovations(
     return jax.tree.map(lambda leaf: leaf[:, 0], found)
 
 
-def _beside(a, b):
+def beside(a, b):
     """Two matrices on one diagonal."""
     return a if not b.size else b if not a.size else jax.scipy.linalg.block_diag(a, b)
 
@@ -384,18 +388,10 @@ def _ramps(count: int):
 
 
 def _transition(plant, minv, before: Motion, after: Motion, rates, dt, substeps: int):
-    """Derivative of the state after a sample by the state before it: exponential of the mid-point's `rates`.
-
-    Its series is taken for a step as short as those of the mean, and squared back.
-    """
+    """Derivative of the state after a sample by the state before it, from the mid-point's `rates`."""
     dof, hidden = plant.dof, plant.hidden
     held = _held(plant, minv, rates[dof : 2 * dof], (before.mode == 0) & (after.mode == 0))
-    halvings = (substeps - 1).bit_length()
-    exponent = dt / 2**halvings * jnp.concatenate([rates[:dof], held, rates[2 * dof :]], 0)
-    one, square = jnp.eye(exponent.shape[0]), _product(exponent, exponent)
-    step = one + exponent + _product(square, one / 2 + exponent / 6 + square / 24)  # to the fourth power
-    for _ in range(halvings):
-        step = _product(step, step)
+    step = transition(jnp.concatenate([rates[:dof], held, rates[2 * dof :]], 0), dt, substeps)
     if not hidden:
         return step
     # What is put back within its bounds at the end of the step follows the bound from there on.
@@ -404,6 +400,21 @@ def _transition(plant, minv, before: Motion, after: Motion, rates, dt, substeps:
     return jnp.concatenate(
         [step[: 2 * dof], _product(bounds[:, :dof], step[:dof]) + _product(bounds[:, dof:], step[2 * dof :])]
     )
+
+
+def transition(rates, dt, substeps: int):
+    """Exponential of constant rates for a sample: its series for a step as short as those of the mean, squared back."""
+    halvings = (substeps - 1).bit_length()
+    step = short_transition(dt / 2**halvings * rates)
+    for _ in range(halvings):
+        step = _product(step, step)
+    return step
+
+
+def short_transition(exponent):
+    """Exponential to the fourth power of its exponent, which is what the Runge-Kutta method makes of a step."""
+    one, square = jnp.eye(exponent.shape[0]), _product(exponent, exponent)
+    return one + exponent + _product(square, one / 2 + exponent / 6 + square / 24)
 
 
 def _rest(plant, minv, covariance, mode):

@@ -35,6 +35,8 @@ _KEPT = 8
 """Stretches of a record that are kept, the first ones: those of a long one would fill the memory."""
 _BLOCKS = 64
 """Stretches of a record whose gradients count as independent of each other."""
+_PIECE = 256
+"""Columns of a product that one core is faster with."""
 _NUDGE = 1e-6
 """Change of an unknown that shows what it does."""
 _HANDFUL, _MOSTLY = 8, 0.5
@@ -68,7 +70,7 @@ class Slopes(NamedTuple):
     @property
     def information(self) -> np.ndarray:
         with np.errstate(all="ignore"):
-            return self.by_error @ self.by_error.T + 0.5 * self.by_spread @ self.by_spread.T
+            return _gram(self.by_error) + 0.5 * _gram(self.by_spread)
 
     @property
     def scatter(self) -> np.ndarray:
@@ -83,6 +85,16 @@ class Slopes(NamedTuple):
     @property
     def _by_variance(self) -> np.ndarray:
         return 0.5 * (self.root - self.error**2 / np.maximum(self.root, 1e-30))
+
+
+def _gram(rows: np.ndarray) -> np.ndarray:
+    """Products of rows (unknowns, n) with each other.
+
+    They are taken in pieces that BLAS gives to no threads, which wait for each other longer than they work; it would
+    whatever their size, were the second factor not a copy.
+    """
+    pieces = np.array_split(rows, max(rows.shape[1] // _PIECE, 1), 1)
+    return np.sum([piece @ piece.T.copy() for piece in pieces], 0)
 
 
 def value_and_slopes(run: Callable[[np.ndarray], Innovations], theta: np.ndarray, use: np.ndarray) -> Slopes:
@@ -161,11 +173,8 @@ class Scene:
     @cached_property
     def lowered(self) -> tuple[list[Array], Any]:
         """Arrays on the device, and what makes plant, noise and readout of them; the drive has the force's delay."""
-        readings, plant = self.readings, without_part(self.plant, "force_delay")
-        noise = _Noise(
-            readings.variance, readings.wander, readings.colour, self.doubt, readings.wandering, readings.coloured
-        )
-        leaves, static = jax.tree.flatten((plant, noise, self.show))
+        seen = without_part(self.plant, "force_delay"), Noise.of(self.readings, self.doubt), self.show
+        leaves, static = jax.tree.flatten(seen)
         return jax.device_put(leaves), static
 
     def stretch(self, begin: int) -> Stretch:
@@ -220,7 +229,7 @@ def _padded(rows: np.ndarray, begin: int) -> Any:
     return found
 
 
-class _Noise(eqx.Module):
+class Noise(eqx.Module):
     """What all lanes assume of noise, before their own factors on that of the channels."""
 
     variance: Float[Array, " channels"]
@@ -229,6 +238,10 @@ class _Noise(eqx.Module):
     doubt: Float[Array, " state"]
     wandering: tuple[int, ...] = eqx.field(static=True)
     coloured: tuple[int, ...] = eqx.field(static=True)
+
+    @classmethod
+    def of(cls, seen: Readings, doubt: Float[Array, " state"]) -> "Noise":
+        return cls(seen.variance, seen.wander, seen.colour, doubt, seen.wandering, seen.coloured)
 
     def assumed(self, log_scale: Float[Array, "lanes channels"], velocity: Float[Array, "lanes dof dof"]) -> Assumed:
         """That of all lanes."""
@@ -253,7 +266,7 @@ def _run(
 ) -> tuple[State, Innovations]:
     """State of all lanes after a stretch, and innovations (n, lanes, channels); the `first` one has no state yet.
 
-    `leaves` and `static` are a plant, `_Noise` and a readout.
+    `leaves` and `static` are a plant, `Noise` and a readout.
     """
     plant, noise, show = jax.tree.unflatten(static, leaves)
     floats, fixed = eqx.partition(plant, eqx.is_inexact_array)
@@ -262,7 +275,7 @@ def _run(
         return eqx.partition(with_vector(eqx.combine(floats, fixed), row), eqx.is_inexact_array)[0]
 
     plants = eqx.combine(jax.vmap(lane)(numbers), fixed)
-    x0, v0, log_scale = _tail(plant, numbers, noise.variance.size)
+    x0, v0, log_scale = tail_of(plant, numbers, noise.variance.size)
     assumed = noise.assumed(log_scale, velocity)
 
     def begin() -> State:
@@ -277,7 +290,7 @@ def _run(
     return run(plants, assumed, show, stretch, dt, state, one_kernel=one_kernel)
 
 
-def _tail(plant: Plant, numbers, channels: int):
+def tail_of(plant: Plant, numbers, channels: int):
     """x0, v0 and the logarithms of the factors on the channels' noise."""
     dof, tail = plant.dof, numbers[:, numbers.shape[1] - 2 * plant.dof - channels :]
     return tail[:, :dof], tail[:, dof : 2 * dof], tail[:, 2 * dof :]
@@ -347,7 +360,7 @@ def _along_motion(scene: Scene, runs: Runs, count: int, found: Innovations) -> N
 
 @eqx.filter_jit
 def _along(plant: Plant, numbers, show: Readout, fine: Any, readings: Readings, velocity, doubt) -> Innovations:
-    log_scale = _tail(plant, numbers, readings.values.shape[1])[2]
+    log_scale = tail_of(plant, numbers, readings.values.shape[1])[2]
 
     def one(numbers, velocity, log_scale):
         lane = with_vector(plant, numbers)

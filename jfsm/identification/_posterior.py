@@ -16,6 +16,7 @@ from ..structures import AbstractFriction, ChannelDelay, ForceDelay, Structure
 from ._colour import Colour
 from ._layout import plant_rows, plant_vector
 from ._likelihood import Runs, Scene, Slopes, innovations_of, value_and_slopes
+from ._linear_lanes import is_linear, linear_innovations
 from ._nuisances import Nuisances
 from ._unknowns import Unknown, values_of
 
@@ -148,7 +149,8 @@ class Posterior:
         scene = part.scene(self.records[index], until) if nuisances is None else part.of_record(nuisances, until)
         nuisances = self.records[index] if nuisances is None else nuisances
         velocity = np.stack([slackened(nuisances, share) for share in slack])
-        return innovations_of(scene, Runs(part.numbers(theta[:, part.mine]), velocity, use, push), until)
+        runs = Runs(part.numbers(theta[:, part.mine]), velocity, use, push)
+        return (linear_innovations if is_linear(scene) else innovations_of)(scene, runs, until)
 
     def innovations(
         self,
