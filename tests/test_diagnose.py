@@ -377,8 +377,8 @@ def test_a_law_that_is_not_looked_for_gets_no_name_and_a_map_that_runs():
 
 def test_laws_of_a_class_share_one_program(believed, monkeypatch):
     traced = []
-    original = _likelihood._tail
-    monkeypatch.setattr(_likelihood, "_tail", lambda *a: traced.append(1) or original(*a))
+    original = _likelihood.tail_of
+    monkeypatch.setattr(_likelihood, "tail_of", lambda *a: traced.append(1) or original(*a))
     jax.clear_caches()
     jfsm.diagnose(made(duffing), believed, causes=FEW, key=jax.random.key(0))
     assert traced

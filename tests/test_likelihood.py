@@ -267,8 +267,8 @@ def test_the_first_readings_lead_unless_the_record_begins_quietly():
 @pytest.fixture
 def traces(monkeypatch) -> list[None]:
     """One entry for each time that the likelihood is traced into a program."""
-    found, tail = [], _likelihood._tail
-    monkeypatch.setattr(_likelihood, "_tail", lambda *args: found.append(None) or tail(*args))
+    found, tail = [], _likelihood.tail_of
+    monkeypatch.setattr(_likelihood, "tail_of", lambda *args: found.append(None) or tail(*args))
     return found
 
 

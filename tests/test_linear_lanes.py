@@ -25,7 +25,7 @@ def scene_and_runs():
     motion = jfsm.simulate(model, still)
     shown = {"acceleration": {1: motion.acceleration[:, 0], 3: motion.acceleration[:, 2]}}
     shown["displacement"] = {2: motion.displacement[:, 1] + 1e-4 * rng.standard_normal(N)}
-    record = jfsm.Record(t, force={3: force}, **shown)
+    record = jfsm.Record(t, force={3: force}, acceleration=shown["acceleration"], displacement=shown["displacement"])
     prepared = prepare_all([record], model, "band-limited")
     structure, unknowns = _beginning(model, free_paths(model, prepared, ()), prepared, {})
     posterior = Posterior(Hypothesis((structure,), (unknowns,)), prepared)

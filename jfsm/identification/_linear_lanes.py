@@ -3,6 +3,7 @@
 Runs that differ in no mass, spring, dashpot, gain of a channel or noise obey the same law of the linear filter.
 """
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -37,7 +38,8 @@ def is_linear(scene: Scene) -> bool:
 def linear_innovations(scene: Scene, runs: Runs, count: int) -> Innovations:
     """Innovations (lanes, count, channels) of a record that `is_linear`, as `innovations_of` gives them."""
     shape = len(runs.numbers), count, scene.readings.values.shape[1]
-    found = Innovations(np.empty(shape), np.empty(shape), np.zeros(shape))
+    empty: Callable[..., Any] = np.zeros
+    found = Innovations(empty(shape), empty(shape), empty(shape))
     for begin in range(0, shape[0], _MOST):
         mine = slice(begin, begin + _MOST)
         push = None if runs.push is None else runs.push[mine]
@@ -50,18 +52,18 @@ def _put(scene: Scene, runs: Runs, count: int, found: Innovations) -> None:
     """Put in what some lanes have `found`, a stretch of samples after the other."""
     assert isinstance(scene.fine, Fine)
     fine, values = scene.fine, np.asarray(scene.readings.values)
-    use = np.asarray(scene.readings.use) if runs.use is None else runs.use
+    course: Any = None
+    use: Any = np.asarray(scene.readings.use) if runs.use is None else runs.use
     leaves, static = scene.lowered
     first, lanes = _Lanes.of(scene, runs)
-    force = np.asarray(fine.force)[:count, :, None]
+    force: Any = np.asarray(fine.force)[:count, :, None]
     if runs.push is not None:
         push = _filled(between_samples(runs.push, force.shape[1], count), len(lanes.whose))
         force = force + np.moveaxis(push, 0, 2)
-    course = None
     law = _law(static, fine.substeps, leaves, runs.numbers[first], runs.velocity[first], np.asarray(fine.step))
     for begin in range(0, count, SAMPLES):
         end = min(begin + SAMPLES, count)
-        some = _Samples(force[begin:end], np.asarray(fine.base)[begin:end], values[begin:end], use[begin:end])
+        some = force[begin:end], np.asarray(fine.base)[begin:end], values[begin:end], use[begin:end]
         samples = _Samples(*(_filled(a, SAMPLES) for a in some))
         course = Course(lanes.start, law.start) if course is None else course
         course, errors = _follow(law, lanes, samples, np.asarray(end - begin), course)
@@ -70,7 +72,7 @@ def _put(scene: Scene, runs: Runs, count: int, found: Innovations) -> None:
         found.variance[:, begin:end] = np.moveaxis(variance, 1, 0)[lanes.whose[: len(found.error)]]
 
 
-def _filled(rows: np.ndarray, count: int) -> np.ndarray:
+def _filled(rows: Any, count: int) -> Any:
     """As many rows, the last of them repeated."""
     return rows if len(rows) == count else rows[np.minimum(np.arange(count), len(rows) - 1)]
 
@@ -82,11 +84,11 @@ def _lots(count: int) -> int:
 class _Lanes(NamedTuple):
     """Whose law every lane obeys, the gain and zero of its force, the zeros of its channels, and where it begins."""
 
-    whose: np.ndarray
-    force_gain: np.ndarray
-    force_offset: np.ndarray
-    channel_offset: np.ndarray
-    start: np.ndarray
+    whose: Any
+    force_gain: Any
+    force_offset: Any
+    channel_offset: Any
+    start: Any
 
     @classmethod
     def of(cls, scene: Scene, runs: Runs) -> tuple[np.ndarray, "_Lanes"]:
