@@ -20,7 +20,8 @@ jax.config.update("jax_numpy_rank_promotion", "raise")
 def pytest_configure(config: pytest.Config) -> None:
     """One store of compiled programs for all processes and for the next run, one thread of linear algebra for each."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    if "JAX_COMPILATION_CACHE_DIR" in os.environ or hasattr(config, "workerinput"):
+    chosen = "JAX_COMPILATION_CACHE_DIR" in os.environ or hasattr(config, "workerinput")
+    if chosen or not config.pluginmanager.hasplugin("cacheprovider"):
         return
     store = config.cache.mkdir("programs")
     make_room(store, MOST_KEPT)

@@ -76,19 +76,24 @@ def as_one_kernel(loop: Callable[..., Found]) -> Callable[..., Found]:
 
     def called(*arguments: Any) -> Found:
         leaves, tree = jax.tree.flatten(arguments)
-        full = [leaf for leaf in leaves if leaf.size]  # an empty array has no place in a kernel
-        shape = jax.eval_shape(loop, *arguments)
+        shape: list[Any] = []
 
         def on_full(full: list[Any]) -> list[Any]:
-            rest = iter(full)
-            every = [next(rest) if leaf.size else jnp.zeros(leaf.shape, leaf.dtype) for leaf in leaves]
-            return [leaf for leaf in jax.tree.leaves(loop(*jax.tree.unflatten(tree, every))) if leaf.size]
+            outcome = loop(*jax.tree.unflatten(tree, _filled_up(full, leaves)))
+            shape[:] = [jax.tree.map(lambda leaf: jax.ShapeDtypeStruct(leaf.shape, leaf.dtype), outcome)]
+            return [leaf for leaf in jax.tree.leaves(outcome) if leaf.size]
 
         # The attributes belong to the call, not to what is inside: a tagged result tags the operation that it comes
-        # from.
-        tagged: Any = set_xla_metadata(jax.jit(on_full)(full), inlineable="false", xla_cpu_small_call="true")
-        rest = iter(tagged)
-        outcome = [next(rest) if leaf.size else jnp.zeros(leaf.shape, leaf.dtype) for leaf in jax.tree.leaves(shape)]
-        return jax.tree.unflatten(jax.tree.structure(shape), outcome)
+        # from. An empty array has no place in a kernel.
+        full = jax.jit(on_full)([leaf for leaf in leaves if leaf.size])
+        tagged: Any = set_xla_metadata(full, inlineable="false", xla_cpu_small_call="true")
+        found = _filled_up(tagged, jax.tree.leaves(shape[0]))
+        return jax.tree.unflatten(jax.tree.structure(shape[0]), found)
 
     return called if jax.default_backend() == "cpu" else loop
+
+
+def _filled_up(full: list[Any], shapes: list[Any]) -> list[Any]:
+    """Arrays of these shapes: those that hold anything, and the empty ones between them."""
+    rest = iter(full)
+    return [next(rest) if shape.size else jnp.zeros(shape.shape, shape.dtype) for shape in shapes]
