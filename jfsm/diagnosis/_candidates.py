@@ -307,8 +307,8 @@ class Laws:
             begins = [c.begin for c in few]
             posed = hypothesis(self.structure, [c.starts[0] for c in few], [nuisances], begins=begins)
             posterior = Posterior(posed, [nuisances])
-            costs.append([posterior.evaluate(posterior.initial(), slack, first=True)[0] for slack in _SEEN_FROM])
-        return np.nan_to_num(np.concatenate(costs, 1), nan=np.inf)
+            costs.append([posterior.values(posterior.initial(), slack, first=True) for slack in _SEEN_FROM])
+        return np.concatenate(costs, 1)
 
 
 def _shows(effect: type, kind: str, records: Sequence[Nuisances]) -> bool:

@@ -41,7 +41,7 @@ def coloured(beside: Trial, problem: Problem) -> Problem | None:
     other = problem.with_colour(posterior.colour(beside.theta, channels, loudest))
     again = other.posterior_of(beside)
     theta = again.at_the_floor(beside.theta)
-    before, after = (p.value(t) for p, t in ((posterior, beside.theta), (again, theta)))
+    before, after = (float(p.values(t[None])[0]) for p, t in ((posterior, beside.theta), (again, theta)))
     if before - after < UNPREDICTED:
         return None
     return other if all(_uncorrelated(again, theta, index) for index in range(count)) else None

@@ -71,7 +71,7 @@ def gain_of_delay(beside: Trial, channel: tuple[str, int], problem: Problem) -> 
 
 
 def _cost(t: Trial, problem: Problem) -> float:
-    return problem.posterior_of(t).value(t.theta)
+    return float(problem.posterior_of(t).values(t.theta[None])[0])
 
 
 def _read_later(problem: Problem, c: int, samples: float) -> Problem:

@@ -124,7 +124,7 @@ class _Lot:
 
     def _begins(self, posterior: Posterior, share: float) -> float:
         """How it begins where such a share is forgiven; past the time limit no one looks."""
-        return math.inf if self.limit.over else float(np.min(posterior.evaluate(posterior.initial(), share)[0]))
+        return math.inf if self.limit.over else float(np.min(posterior.values(posterior.initial(), share)))
 
     def step(self) -> "_Lot":
         """On to the next rung, unless the time is over."""

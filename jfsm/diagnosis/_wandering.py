@@ -31,7 +31,7 @@ def wandering(beside: Trial, problem: Problem, least: float) -> int | None:
     if shares[channel] < least:
         return None
     wandered = problem.with_wandering(channel).posterior_of(beside)
-    before, after = (one.value(beside.theta) for one in (posterior, wandered))
+    before, after = (float(one.values(beside.theta[None])[0]) for one in (posterior, wandered))
     return channel if before - after > UNPREDICTED else None
 
 

@@ -102,14 +102,23 @@ class Posterior:
                 information[lane][np.ix_(mine, mine)] += found.information
         return value, gradient, information
 
-    def value(self, theta: np.ndarray) -> float:
-        """Minus log-posterior at `theta` (unknowns,) of a hypothesis with one start."""
-        total = prior(self.hypothesis.unknowns[0], theta)[0]
-        for index, (nuisances, until) in enumerate(zip(self.records, self.until, strict=True)):
+    def values(self, theta: np.ndarray, slack: float = 0.0, first: bool = False) -> np.ndarray:
+        """Minus log-posterior (lanes,) by itself, infinite where a filter runs away; arguments as of `evaluate`."""
+        found = [self._value(one, lane, slack, first) for lane, one in enumerate(theta)]
+        return np.nan_to_num(found, nan=math.inf, posinf=math.inf)
+
+    def _value(self, theta: np.ndarray, lane: int, slack: float, first: bool) -> float:
+        total = prior(self.hypothesis.unknowns[lane], theta)[0]
+        for index, nuisances in enumerate(self.records):
+            until, forgiven = self._until(index, first), max(slack, nuisances.forgiven)
+            seen = self._run(theta[None], index, lane, np.full(1, forgiven), until)
             use = np.asarray(nuisances.readings.use)[:until]
-            found = self._run(theta[None], index, 0, np.full(1, nuisances.forgiven), until)
-            total += value_and_slopes(lambda _, found=found: found, np.zeros(0), use).value
+            total += value_and_slopes(lambda _, seen=seen: seen, np.zeros(0), use).value
         return total
+
+    def _until(self, index: int, first: bool) -> int:
+        """How many samples of a record count."""
+        return min(self.until[index], self.records[index].leading) if first else self.until[index]
 
     def scatter(self, theta: np.ndarray) -> np.ndarray:
         """Covariance (lanes, unknowns, unknowns) of the gradient as the record itself shows it, from its stretches."""
@@ -121,8 +130,7 @@ class Posterior:
 
     def _slopes(self, theta: np.ndarray, index: int, lane: int, slack: float = 0.0, first: bool = False) -> Slopes:
         """What the readings of record `index` say of the unknowns that act on it."""
-        nuisances, end = self.records[index], self.until[index]
-        until = min(end, nuisances.leading) if first else end
+        nuisances, until = self.records[index], self._until(index, first)
         use, mine = np.asarray(nuisances.readings.use)[:until], self._parts[index][lane].mine
         forgiven = max(slack, nuisances.forgiven)
 
