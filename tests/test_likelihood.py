@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.dynamics._grid import Fine
+from jfsm.dynamics._grid import Fine, drive_before, punctual
+from jfsm.dynamics._plant import lower
 from jfsm.identification import (
     Hypothesis,
     Nuisances,
@@ -21,6 +22,7 @@ from jfsm.identification import (
     prepare,
     with_offsets,
 )
+from jfsm.identification._drive import forces_before, punctual_force
 from jfsm.identification._posterior import prior
 from jfsm.structures import AbstractTerm
 
@@ -159,6 +161,7 @@ def test_two_lanes_are_what_each_of_them_is_alone(chain_nuisances, smooth):
     both = Posterior(together(smooth.hypothesis, other), [chain_nuisances])
     theta = somewhere(both)
     found = both.evaluate(theta)
+    np.testing.assert_allclose(both.values(theta), found[0], rtol=1e-12)
     for lane, alone in enumerate((smooth, Posterior(other, [chain_nuisances]))):
         for part, expected in zip(found, alone.evaluate(theta[lane][None]), strict=True):
             np.testing.assert_allclose(part[lane], expected[0], rtol=1e-9, atol=1e-9 * np.max(np.abs(expected)))
@@ -173,6 +176,16 @@ def test_delays_that_begin_far_apart_run_side_by_side(single_nuisances):
     for lane, one in enumerate((short, long)):
         alone = Posterior(one, [single_nuisances])
         assert values[lane] == pytest.approx(alone.evaluate(alone.initial())[0][0], rel=1e-9)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.3, -1.7])
+def test_what_drives_a_late_sensor_is_the_same_on_the_host_as_in_a_run(single_nuisances, delay):
+    fine, plant = single_nuisances.fine, lower(SINGLE + jfsm.structures.ForceDelay(delay * DT, at=("force", 1)))
+    there = punctual(plant, fine).force
+    np.testing.assert_allclose(punctual_force(np.asarray(fine.force), np.array([delay])), there, atol=1e-12)
+    force, base = drive_before(fine, np.asarray(delay * DT))
+    here = forces_before(fine, delay * DT)
+    np.testing.assert_allclose(here, np.concatenate([force, np.asarray(base)[..., None]], 2), atol=1e-12)
 
 
 def test_more_starts_than_lanes_are_refused(chain_nuisances, smooth):
