@@ -4,6 +4,7 @@ import itertools
 from dataclasses import replace
 
 import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -183,7 +184,7 @@ def test_what_drives_a_late_sensor_is_the_same_on_the_host_as_in_a_run(single_nu
     fine, plant = single_nuisances.fine, lower(SINGLE + jfsm.structures.ForceDelay(delay * DT, at=("force", 1)))
     there = punctual(plant, fine).force
     np.testing.assert_allclose(punctual_force(np.asarray(fine.force), np.array([delay])), there, atol=1e-12)
-    force, base = drive_before(fine, np.asarray(delay * DT))
+    force, base = drive_before(fine, jnp.asarray(delay * DT))
     here = forces_before(fine, delay * DT)
     np.testing.assert_allclose(here, np.concatenate([force, np.asarray(base)[..., None]], 2), atol=1e-12)
 
