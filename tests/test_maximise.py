@@ -60,7 +60,7 @@ class Valley:
         names = ("a.k", "b.k")
         self.hypothesis = SimpleNamespace(unknowns=(tuple(Unknown(n, 0.0, 1.0, True, 0.0, 1.0) for n in names),))
 
-    def evaluate(self, theta, slack=0.0, most=None):
+    def evaluate(self, theta, slack=0.0, first=False, lanes=None):
         self.asked += 1
         a, b = theta[0]
         residuals = np.array([1e3 * (np.exp(a) + np.exp(b) - 2.0), self.much * (a + 1.5)])
@@ -88,10 +88,10 @@ def test_a_climb_whose_time_is_over_looks_once_more_at_most(after: int):
     limit, begin = Limit(), np.array([[0.5, np.log(2 - np.exp(0.5))]])
 
     class Watched(Valley):
-        def evaluate(self, theta, slack=0.0, most=None):
+        def evaluate(self, theta, slack=0.0, first=False, lanes=None):
             if self.asked + 1 == after:
                 limit.ask()
-            return super().evaluate(theta, slack, most)
+            return super().evaluate(theta, slack, first, lanes)
 
     valley = Watched(much=30.0)
     start = Maximum(np.zeros(1), begin, np.zeros((1, 2, 2)), ())

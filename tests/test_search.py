@@ -421,8 +421,8 @@ def test_starts_that_begin_best_where_more_or_less_is_forgiven_both_climb(monkey
         def initial(self):
             return np.zeros((1, 1))
 
-        def evaluate(self, theta, share):
-            return (np.array([self.begun[share]]),)
+        def values(self, theta, share):
+            return np.array([self.begun[share]])
 
     starts = [
         Start({0.03: 2.0, 0.01: 1.0}, -5.0),
