@@ -9,6 +9,8 @@ from .._term import ABOVE_ZERO, AbstractTerm, Parameter, Scalar, as_link
 from .piecewise_stiffness import EndStop, beyond
 
 _STIFFNESS = Parameter("k", force=1, length=-1, meaning="stiffness while it sticks")
+_ROUNDING = 1e-9
+"""Share of a force by which what is at its limit may seem to be below it."""
 _SLIDERS = 16
 _CLOSED = 0.02
 """What a Bouc-Wen loop loses, as a share of how far it leans, below which it is closed."""
@@ -164,13 +166,19 @@ class FreePlay(AbstractTerm):
     states = 1
 
     def force(self, d, w, z, t):
-        pull = self.k * beyond(d - z[0], self.gap)
-        return jnp.where(pull >= self.F_plus, self.F_plus, jnp.where(pull <= -self.F_minus, -self.F_minus, pull))
+        pull, forward, backward = self._pull(d, z)
+        return jnp.where(forward, self.F_plus, jnp.where(backward, -self.F_minus, pull))
 
     def state_rate(self, d, w, z, t):
-        pull = self.k * beyond(d - z[0], self.gap)
-        sliding = ((pull >= self.F_plus) & (w > 0)) | ((pull <= -self.F_minus) & (w < 0))
+        _, forward, backward = self._pull(d, z)
+        sliding = (forward & (w > 0)) | (backward & (w < 0))
         return jnp.stack([jnp.where(sliding, w, 0.0)])
+
+    def _pull(self, d, z):
+        """Force of the spring, and whether it has reached the limit ahead or behind; rounding is not to decide that."""
+        pull = self.k * beyond(d - z[0], self.gap)
+        least = 1.0 - _ROUNDING
+        return pull, pull >= least * self.F_plus, pull <= -least * self.F_minus
 
     def initial_state(self, d, w):
         return jnp.stack([d])
