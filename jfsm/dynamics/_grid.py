@@ -45,10 +45,6 @@ class Fine(eqx.Module):
         time = begin + step * np.arange(n * count + max(more, 0))
         return Fine(jnp.asarray(force), jnp.asarray(base), jnp.asarray(time), jnp.asarray(step))
 
-    def head(self, n: int) -> "Fine":
-        """What drives the first `n` samples."""
-        return Fine(self.force[:n], self.base[:n], self.time[:n], self.step)
-
 
 def punctual(plant: Plant, fine: Fine) -> Fine:
     """What drives a run with the delay of its force sensor undone: the force of t is what is read at t + tau."""
@@ -128,22 +124,17 @@ def remember(past: Past, x: Float[Array, " dof"], v: Float[Array, " dof"], keep:
 
 
 def delayed_force(plant: Plant, minv, motion: Motion, past: Past, g, time, step) -> Float[Array, "halves dof"]:
-    """Forces that answer the past, on the half steps of a sample; `g` (halves, dof) is what drives it."""
-    a = acceleration(plant, minv, motion.x, motion.v, motion.z, motion.mode, g[0], time)[0]
-    return answers(plant, motion, past, a, jnp.linspace(0.0, 1.0, g.shape[0]), time, step)
-
-
-def answers(
-    plant: Plant, motion: Motion, past: Past, a, ahead: Float[Array, " nodes"], time, step
-) -> Float[Array, "nodes dof"]:
-    """Forces that answer the past, at some shares `ahead` of a sample that begins with a motion and acceleration `a`.
+    """Forces that answer the past, on the half steps of a sample; `g` (halves, dof) is what drives it.
 
     The past is read by cubic Hermite interpolation between samples. What lies inside the present sample (a delay
     shorter than it) is read off the parabola that the motion begins it with.
     """
-    reach, slots, total = past.x.shape[0], plant.delayed, jnp.zeros((ahead.size, plant.dof))
+    halves, reach = g.shape[0], past.x.shape[0]
+    a = acceleration(plant, minv, motion.x, motion.v, motion.z, motion.mode, g[0], time)[0]
+    ahead = jnp.linspace(0.0, 1.0, halves)
+    slots, total = plant.delayed, jnp.zeros(g.shape)
 
-    def before(k: Int[Array, " nodes"], now, ring) -> Float[Array, "nodes dof"]:
+    def before(k: Int[Array, " halves"], now, ring) -> Float[Array, "halves dof"]:
         """Values so many samples ago."""
         return jnp.where((k == 0)[:, None], now[None, :], ring[(past.count - k) % reach])
 

@@ -133,7 +133,7 @@ class Nuisances:
     forgiven: float = 0.0
     colour: Colour | None = None
     stretches: dict[int, Stretch] = field(default_factory=dict, init=False, repr=False)
-    _heads: dict[int, tuple[Fine | Imposed, Readings]] = field(default_factory=dict, init=False, repr=False)
+    _heads: dict[int, tuple[Imposed, Readings]] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def samples(self) -> int:
@@ -193,8 +193,9 @@ class Nuisances:
             return float(np.max(self.spread[self.judged]))
         return float(np.mean(np.diag(_mass(structure)))) * self.omega**2 * self.length
 
-    def head(self, until: int) -> tuple[Fine | Imposed, Readings]:
-        """What is imposed, and the readings, cut to the padded length of the first `until` samples."""
+    def head(self, until: int) -> tuple[Imposed, Readings]:
+        """The motion that is imposed, and the readings, cut to the padded length of the first `until` samples."""
+        assert isinstance(self.fine, Imposed)
         n, r = min(bucket(until), self.fine.time.shape[0]), self.readings
         if n not in self._heads:
             self._heads[n] = self.fine.head(n), replace(r, values=r.values[:n], use=r.use[:n], valid=r.valid[:n])
