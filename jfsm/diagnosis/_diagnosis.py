@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -89,14 +90,21 @@ class Diagnosis:
     notes: tuple[str, ...]
     sentence: str
     advice: str
-    data: dict[str, Any]
-    """Everything that `to_json` writes and the page shows, as plain types."""
+    told: dict[str, Any]
+    """What `data` says, but for what is drawn."""
+    drawn: Callable[[], dict[str, Any]]
+    """Makes what is drawn. It takes a map of the missing force, which nothing else needs."""
     leading: Leading | None = None
     """The two most probable explanations, where there are two; None otherwise."""
     finished: bool = True
     """Whether everything was looked into; if not, `notes` say what was not."""
     untried: tuple[str, ...] = ()
     """Ids of the causes that a search that was not finished did not try, or not to the end."""
+
+    @cached_property
+    def data(self) -> dict[str, Any]:
+        """Everything that `to_json` writes and the page shows, as plain types."""
+        return {**self.told, **self.drawn()}
 
     def __repr__(self) -> str:
         return f"<Diagnosis, {self.verdict}{'' if self.finished else ', not finished'}: {self.sentence}>"

@@ -2,13 +2,15 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..identification import Nuisances
-from ..structures import PARAMETER_CAUSES, Cause, Clipping, Structure, causes, is_offset
+from ..records import Record
+from ..structures import PARAMETER_CAUSES, AbstractTerm, Cause, Clipping, Structure, causes, is_offset
 from ._adequacy import NEGLIGIBLE
 from ._between import Difference, differences
 from ._candidates import Candidate
@@ -49,6 +51,30 @@ class Tested(NamedTuple):
     seen: list[Smallest]
     unfit: Callable[[Trial], float | None]
     unfinished: Unfinished
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """The missing force of a record of some `period` beside the law that stands for it, runs over what is held out, and
+    the force's shape in words, where that is asked for; made when it is called."""
+
+    missing: Residual
+    runs: list[dict]
+    term: AbstractTerm | None
+    record: Record
+    period: float
+    with_shape: bool
+
+    def __call__(self) -> dict[str, Any]:
+        shape, start = shape_of(self.missing) if self.with_shape else None, float(self.record.time[0])
+        return {
+            "shape": None if shape is None else {**_plain(shape._asdict()), "words": shape.words},
+            "curves": {
+                "holdout": _holdout(self.runs),
+                **curves(self.missing, self.record.units, self.term),
+                "course": course(self.missing, start, self.record.dt, self.period),
+            },
+        }
 
 
 def assemble(
@@ -95,9 +121,11 @@ def assemble(
     notes = tuple(dict.fromkeys(said))
     noise = {f"{kind} {j}": float(s) for n in records[:1] for (kind, j), s in zip(n.channels, n.floor, strict=True)}
     smallest = _detectable(tested.seen, units)
-    shape = None if decision.verdict == "consistent" else shape_of(missing)
+    shape = shape_of(missing) if decision.verdict in ("undecided", "unnamed") else None
+    record, period, shaped = records[0].record, records[0].period, decision.verdict != "consistent"
+    drawn = Drawn(missing, runs, decision.named_term, record, period, with_shape=shaped)
     sentence, advice = _words(decision, findings, gain, shape, differ, imposed=records[0].path is not None)
-    data = {
+    told = {
         "jfsm": _version(),
         "verdict": decision.verdict,
         "finished": not tested.unfinished.notes,
@@ -112,19 +140,13 @@ def assemble(
         "refitted": {p: {"given": model.values()[p], **_plain(e)} for p, e in refit.items()},
         "between_records": {one.path: [list(interval) for interval in one.intervals] for one in between},
         "gain": None if gain is None else _gain(gain),
-        "shape": None if shape is None else {**_plain(shape._asdict()), "words": shape.words},
         "notes": list(notes),
         "detectable": {c: s.plain for c, s in smallest.items()},
-        "curves": {
-            "holdout": _holdout(runs),
-            **curves(missing, units, decision.named_term),
-            "course": course(missing, float(records[0].record.time[0]), records[0].record.dt, records[0].period),
-        },
     }
     return Diagnosis(
         verdict=decision.verdict, findings=findings, candidates=candidates, extended=extended, refitted=refit,
         gain=gain, detectable={c: s.size for c, s in smallest.items()}, noise=noise, notes=notes,
-        sentence=sentence, advice=advice, data=data, leading=leading,
+        sentence=sentence, advice=advice, told=told, drawn=drawn, leading=leading,
         finished=not tested.unfinished.notes, untried=tested.unfinished.untried,
     )  # fmt: skip
 

@@ -54,9 +54,8 @@ def with_vector(plant: Plant, vector: Float[Array, " size"]) -> Plant:
 
 def place_of(plant: Plant, name: str) -> slice:
     """Where the numbers of one of its arrays stand in those of a plant."""
-    sizes = {part: int(np.prod(getattr(plant, part).shape)) for part in _PARTS}
-    begin = sum(sizes[part] for part in _PARTS[: _PARTS.index(name)])
-    return slice(begin, begin + sizes[name])
+    begin = sum(getattr(plant, part).size for part in _PARTS[: _PARTS.index(name)])
+    return slice(begin, begin + getattr(plant, name).size)
 
 
 def without_part(plant: Plant, name: str) -> Plant:

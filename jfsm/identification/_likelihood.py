@@ -177,6 +177,19 @@ class Scene:
         leaves, static = jax.tree.flatten(seen)
         return jax.device_put(leaves), static
 
+    @cached_property
+    def nowhere(self) -> State:
+        """A state of all lanes before there is any, on the device."""
+        plant, readings = self.plant, self.readings
+        dof, slots, reach = plant.dof, len(plant.friction), plant.reach if len(plant.delayed) else 0
+        motion, zeros = 2 * dof + plant.hidden, 2 * len(readings.wandering) + len(readings.coloured)
+        none: Callable[..., Any] = np.zeros
+        past = Past(none((RUNS, reach, dof)), none((RUNS, reach, dof)), none(RUNS, int))
+        return jax.device_put(State(
+            none((RUNS, dof)), none((RUNS, dof)), none((RUNS, plant.hidden)), none((RUNS, slots), int), past,
+            none((RUNS, motion + zeros, motion + zeros)), none((RUNS, slots)), none((RUNS, zeros)),
+        ))  # fmt: skip
+
     def stretch(self, begin: int) -> Stretch:
         """Samples from `begin`, as many as a program runs, as the record has them."""
         if begin in self.stretches:
@@ -209,7 +222,7 @@ def _filtered(scene: Scene, runs: Runs, count: int, found: Innovations) -> None:
     """Put in what a full set of lanes has `found`, or the first of them, a stretch of samples after the other."""
     leaves, static = scene.lowered
     numbers = np.delete(runs.numbers, place_of(scene.plant, "force_delay"), 1)
-    drive, state, dt = _Drive.of(scene, runs, count), _nowhere(scene.plant, scene.readings), np.asarray(scene.fine.step)
+    drive, state, dt = _Drive.of(scene, runs, count), scene.nowhere, np.asarray(scene.fine.step)
     parts = []
     for begin in range(0, count, SAMPLES):
         stretch = drive.put_in(scene.stretch(begin), begin, runs.use)
@@ -218,7 +231,7 @@ def _filtered(scene: Scene, runs: Runs, count: int, found: Innovations) -> None:
     for k, part in enumerate(parts):  # all are on their way by now
         rows = slice(k * SAMPLES, min((k + 1) * SAMPLES, count))
         for whole, lanes in zip(found, part, strict=True):
-            whole[:, rows] = np.moveaxis(np.asarray(lanes), 1, 0)[: len(whole), : rows.stop - rows.start]
+            whole[:, rows] = np.asarray(lanes)[: rows.stop - rows.start, : len(whole)].swapaxes(0, 1)
 
 
 def _padded(rows: np.ndarray, begin: int) -> Any:
@@ -294,18 +307,6 @@ def tail_of(plant: Plant, numbers, channels: int):
     """x0, v0 and the logarithms of the factors on the channels' noise."""
     dof, tail = plant.dof, numbers[:, numbers.shape[1] - 2 * plant.dof - channels :]
     return tail[:, :dof], tail[:, dof : 2 * dof], tail[:, 2 * dof :]
-
-
-def _nowhere(plant: Plant, readings: Readings) -> State:
-    """A state of all lanes before there is any."""
-    dof, slots, reach = plant.dof, len(plant.friction), plant.reach if len(plant.delayed) else 0
-    motion, zeros = 2 * dof + plant.hidden, 2 * len(readings.wandering) + len(readings.coloured)
-    none: Callable[..., Any] = np.zeros
-    past = Past(none((RUNS, reach, dof)), none((RUNS, reach, dof)), none(RUNS, int))
-    return State(
-        none((RUNS, dof)), none((RUNS, dof)), none((RUNS, plant.hidden)), none((RUNS, slots), int), past,
-        none((RUNS, motion + zeros, motion + zeros)), none((RUNS, slots)), none((RUNS, zeros)),
-    )  # fmt: skip
 
 
 class _Drive(NamedTuple):

@@ -156,7 +156,8 @@ class Posterior:
         part = self._parts[index][lane]
         scene = part.scene(self.records[index], until) if nuisances is None else part.of_record(nuisances, until)
         nuisances = self.records[index] if nuisances is None else nuisances
-        velocity = np.stack([slackened(nuisances, share) for share in slack])
+        shares, which = np.unique(slack, return_inverse=True)
+        velocity = np.stack([slackened(nuisances, share) for share in shares])[which]
         runs = Runs(part.numbers(theta[:, part.mine]), velocity, use, push)
         return (linear_innovations if is_linear(scene) else innovations_of)(scene, runs, until)
 

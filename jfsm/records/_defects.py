@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import maximum_filter1d, median_filter
 
+from jfsm.records._asked_again import kept
 from jfsm.records._noise_floor import noise_floor
 from jfsm.records._quantisation import quantisation_step
 
@@ -106,11 +107,15 @@ def spikes(y: ArrayLike, std: float) -> NDArray[np.bool_]:
     return mask & (height > ALONE * maximum_filter1d(left, SURROUNDING))
 
 
+@kept
 def defects(y: ArrayLike, dt: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Which samples (n,) of a channel are no readings: those at the limit of its recorder, and those torn out of it."""
     y = np.asarray(y, dtype=np.float64)
     torn = spikes(y, noise_floor(y, dt).std)
-    return clipped(y, torn), torn
+    found = clipped(y, torn), torn
+    for mask in found:
+        mask.setflags(write=False)
+    return found
 
 
 def bridged(y: NDArray[np.float64], lost: NDArray[np.bool_]) -> NDArray[np.float64]:

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import solveh_banded
 
+from jfsm.records._asked_again import kept
 from jfsm.records._core import core_std
 from jfsm.records._flat_top import flat_top_std, spectrum_by_band
 from jfsm.records._quantisation import quantisation_step
@@ -73,6 +74,7 @@ class NoiseFloor:
         return self.explained < SILENCE
 
 
+@kept
 def noise_floor(y: ArrayLike, dt: float) -> NoiseFloor:
     """Noise of one uniformly sampled channel.
 

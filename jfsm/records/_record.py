@@ -79,7 +79,7 @@ class Record:
         factors = {kind: unit.factor for kind, unit in stated.items()}
         self._time = as_time(time, factors.pop("time", 1.0))
         stated.pop("time", None)
-        self._units = MappingProxyType(coherent_units(stated))
+        self._units = dict(coherent_units(stated))
         given = {"force": force, "displacement": displacement, "velocity": velocity, "acceleration": acceleration}
         self._columns: dict[str, Columns] = {
             kind: as_columns(kind, samples, self._time, factors.get(kind, 1.0))
@@ -151,7 +151,7 @@ class Record:
     @property
     def units(self) -> Mapping[str, str]:
         """Unit of each kind of channel, also of kinds that were not measured."""
-        return self._units
+        return MappingProxyType(self._units)
 
     @property
     def dofs(self) -> int:
