@@ -183,10 +183,12 @@ def alone_there(laws: Collection[tuple[tuple, type]], among: Sequence[Candidate]
     return [c for c in alone if (c.effects[0].at, c.effects[0].cause.effect) in laws]
 
 
-def as_promising(effects: tuple[Effect, ...], tried: Sequence[Candidate], left: Sequence[Candidate]) -> list[Candidate]:
-    """Candidates left out that explain hardly less of the missing force than the `effects` that were found."""
+def as_promising(
+    effects: tuple[Effect, ...], tried: Sequence[Candidate], left: Sequence[Candidate], least: float = _HARDLY_LESS
+) -> list[Candidate]:
+    """Candidates left out that explain `least` times as much of the missing force as the `effects` found, or more."""
     found = max((c.share for c in tried if c.effects == effects and c.share is not None), default=math.inf)
-    return [c for c in left if c.starts and c.share is not None and c.share >= _HARDLY_LESS * found]
+    return [c for c in left if c.starts and c.share is not None and c.share >= least * found]
 
 
 def elsewhere(effects: tuple[Effect, ...], left: Sequence[Candidate]) -> list[Candidate]:

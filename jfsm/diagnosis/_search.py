@@ -217,13 +217,14 @@ def search(
     refitted: Trial,
     problem: Problem,
     tell: Tell,
+    known: Sequence[Trial] = (),
 ) -> Found:
-    """Every candidate fitted, those far behind only so far."""
+    """Every candidate fitted, those far behind only so far, also behind what is `known` already."""
     own = own_part(found_in(refitted)) if refitted.evidence > given.evidence else None
     lots = [_Lot(beginnings, problem, _ALONE.ladder) for beginnings in groups(tried, own, problem)]
     most = sorted((candidate.share or 0.0 for candidate in tried), reverse=True)[:_PROMISING]
     kept = [lot for lot in lots if lot.share > 0 and lot.share >= most[-1]]
-    return _climbed(lots, _ALONE, kept, refitted, tell)
+    return _climbed(lots, _ALONE, kept, min([refitted, *known], key=lambda t: t.value), tell)
 
 
 def search_akin(

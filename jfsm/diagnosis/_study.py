@@ -43,6 +43,8 @@ from ._wandering import PLAINLY, SLOWLY, steadied, wandering
 
 _AS_LIKELY = 3.0
 """Nats by which trials are apart, at most, of which none is likelier than the other."""
+_STIFF = 8
+"""Times the steps of the model that a law needs from which it is asked late: it costs as many times more."""
 _HEAVIER = 0.03
 """Change of a mass, as a share of it, from which its noise is another."""
 
@@ -201,9 +203,12 @@ class Study:
             return [t for t in trials if t is best or explained(t, refitted) >= GATE]
 
         tried, left_out = promising(every)
+        own = problem.first.steps_for([self.model])
         late = [c for c in tried if c.effects[0].cause.effect is ChannelDelay]  # they have a slow program of their own
-        now = [c for c in tried if c not in late] or tried
+        stiff = [c for c in tried if c not in late and problem.first.steps_for(c.starts) >= _STIFF * own]
+        now = [c for c in tried if c not in late and c not in stiff] or tried
         found = search(now, given, refitted, problem, self.steps.of("single causes"))
+        slow = [c for c in (*late, *stiff) if c not in now]
         if self.limit.over:
             more = []
         elif settled(told([given, refitted, *found.trials])):
@@ -213,13 +218,14 @@ class Study:
             more = contained([law for t in close(found.trials) for law in t.laws], left_out)
             others = [*as_promising(best.effects, every, left_out), *elsewhere(best.effects, left_out)]
             more += [c for c in dict.fromkeys(others) if c not in more]
-            more += [c for c in late if c not in now]
+            more += [c for c in slow if c in late or c in as_promising(best.effects, every, stiff, least=1.0)]
         else:  # of a missing force that is ill seen regression may put the right law last
-            more = [c for c in left_out if c.starts] + [c for c in late if c not in now]
+            more = [c for c in left_out if c.starts] + slow
         if more:
             tell = self.steps.of("more single causes")
-            found = found.and_then(search(more, given, refitted, problem, tell))
+            found = found.and_then(search(more, given, refitted, problem, tell, known=found.trials))
             left_out = [c for c in left_out if c not in more]
+        left_out += [c for c in stiff if c in slow and c not in more]
         akin = self.steps.of("what is akin to the best")
         found = search_akin(close(found.trials), every, found, problem, akin)
         if known is not None and known.effects:

@@ -21,6 +21,8 @@ _STEP_ANGLE = 0.22
 """Largest angle of the fastest mode per step [rad]: Runge-Kutta of order four then shifts a frequency by 2e-5."""
 _MOST_SUBSTEPS = 16
 _MOST_STIFF_SUBSTEPS = 64
+_FINER = 4
+"""Times the steps of the linear part, and powers of that, for laws that are faster: every number has its programs."""
 
 
 class Probe(NamedTuple):
@@ -101,14 +103,13 @@ def substeps_for(structure: Structure, dt: float, size: Size | None = None) -> i
             f"{fastest:.6g} rad/s, the record shows at most {math.pi / dt:.6g}. "
             "Leave that spring, dashpot or small mass out of the model, or use a record of a higher rate."
         )
-    need = max(1.0, fastest * dt / _STEP_ANGLE)
-    most = _MOST_SUBSTEPS
-    if len(plant.smooth) or len(plant.memory):
-        need = max(need, _KINKED_SUBSTEPS if len(plant.memory) else 1)
-        for x, v, angle in probes(structure.dof, size or Size(0.0, 0.0)):
-            need = max(need, _fastest_rate(plant, x, v) * dt / angle)
-        most = _MOST_STIFF_SUBSTEPS
-    return min(most, 2 ** math.ceil(math.log2(need)))
+    own = 2 ** math.ceil(math.log2(max(1.0, fastest * dt / _STEP_ANGLE)))
+    if not len(plant.smooth) + len(plant.memory):
+        return min(_MOST_SUBSTEPS, own)
+    own = max(own, _KINKED_SUBSTEPS if len(plant.memory) else 1)
+    rates = ((_fastest_rate(plant, x, v), angle) for x, v, angle in probes(structure.dof, size or Size(0.0, 0.0)))
+    faster = max(1.0, *(rate * dt / angle / own for rate, angle in rates))
+    return min(_MOST_STIFF_SUBSTEPS, own * _FINER ** math.ceil(math.log(faster, _FINER)))
 
 
 def _fastest_rate(plant: Plant, x: np.ndarray, v: np.ndarray) -> float:

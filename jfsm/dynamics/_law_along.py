@@ -1,10 +1,11 @@
 """The forces of one law along a given motion of its link, for many sets of its numbers.
 
 A law that has no hidden states answers every instant by itself: one program of one size serves all of a table and every
-record, and a number chooses among them. A law with hidden states is a loop over samples and has a program of its own,
-whatever steps it needs.
+record, and a number chooses among them. So it does for laws with hidden states, which are a loop over samples, whatever
+steps they need.
 """
 
+from collections.abc import Callable
 from functools import partial
 
 import equinox as eqx
@@ -13,10 +14,19 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..structures import FRICTION_TERMS, SMOOTH_TERMS, AbstractTerm, LinearDamping, LinearStiffness, MapTerm, Structure
+from ..structures import (
+    FRICTION_TERMS,
+    MEMORY_TERMS,
+    SMOOTH_TERMS,
+    AbstractTerm,
+    LinearDamping,
+    LinearStiffness,
+    MapTerm,
+    Structure,
+)
 from ._along import SUBSTEPS
 from ._grid import delayed_along
-from ._plant import LAW_PARAMETERS, Plant, Slots, numbers_of
+from ._plant import LAW_PARAMETERS, Plant, Slots, hidden_width, numbers_of
 from ._stepper import runge_kutta
 
 _TABLE = (LinearStiffness, LinearDamping, *SMOOTH_TERMS, *FRICTION_TERMS)
@@ -38,7 +48,9 @@ def forces_of_law(
     Hidden states begin relaxed, and take `substeps` a sample.
     """
     if kind.states:
-        return np.asarray(_remembered(kind, numbers, d, w, time, np.asarray(substeps)))
+        laws, more = (MEMORY_TERMS if kind in MEMORY_TERMS else (kind,)), max(LAW_PARAMETERS - numbers.shape[1], 0)
+        chosen, padded = np.array([laws.index(kind)], np.int32), np.pad(numbers, ((0, 0), (0, more)))
+        return np.asarray(_remembered(laws, chosen, padded, d, w, time, np.asarray(substeps)))
     law = kind(*numbers[0].tolist(), at=(0, 1))
     if law.delay is not None:
         plant = numbers_of(Structure([1.0], [law]))
@@ -88,26 +100,36 @@ def _answering_the_past(plant: Plant, numbers, d, w, time):
 
 
 @partial(jax.jit, static_argnums=0)
-def _remembered(kind: type[AbstractTerm], numbers, d, w, time, substeps):
-    return jax.vmap(partial(_remembering, kind), in_axes=(0, None, None, None, None))(numbers, d, w, time, substeps)
+def _remembered(laws: tuple[type[AbstractTerm], ...], chosen, numbers, d, w, time, substeps):
+    along = partial(_remembering, laws, chosen)
+    return jax.vmap(along, in_axes=(0, None, None, None, None))(numbers, d, w, time, substeps)
 
 
-def _remembering(kind: type[AbstractTerm], row, d, w, time, substeps) -> Float[Array, " n"]:
-    law = kind(*(row[i] for i in range(len(kind.parameters))), at=(0, 1))
-    step = time[1] - time[0]
+def _remembering(laws: tuple[type[AbstractTerm], ...], chosen, row, d, w, time, substeps) -> Float[Array, " n"]:
+    slots = Slots(chosen, row[None], jnp.ones((1, 1)), laws)
+    step, width = time[1] - time[0], hidden_width(slots)
+
+    def of_law(ask: Callable[[AbstractTerm], Float[Array, " states"]]) -> Float[Array, " hidden"]:
+        return slots.choose(0, lambda law: jnp.pad(ask(law), (0, width - law.states)))
 
     def sample(z, inputs):
         d0, d1, w0, w1, t = inputs
 
-        def rate(z, s):
-            return law.state_rate(d0 + s * (d1 - d0), w0 + s * (w1 - w0), z, t + s * step)
-
         def substep(i, z):
             begin, end = i / substeps, (i + 1) / substeps
-            after = runge_kutta(rate, z, step / substeps, (begin, (begin + end) / 2, end))
-            return law.settle(d0 + end * (d1 - d0), after)
 
-        return jax.lax.fori_loop(0, substeps, substep, z), law.force(d0, w0, z, t)
+            def along(law):
+                def rate(z, s):
+                    return law.state_rate(d0 + s * (d1 - d0), w0 + s * (w1 - w0), z, t + s * step)
+
+                after = runge_kutta(rate, z[: law.states], step / substeps, (begin, (begin + end) / 2, end))
+                return law.settle(d0 + end * (d1 - d0), after)
+
+            return of_law(along)
+
+        force = slots.choose(0, lambda law: law.force(d0, w0, z[: law.states], t))
+        return jax.lax.fori_loop(0, substeps, substep, z), force
 
     after = [jnp.concatenate([q[1:], q[-1:]]) for q in (d, w)]
-    return jax.lax.scan(sample, law.initial_state(d[0], w[0]), (d, after[0], w, after[1], time))[1]
+    start = of_law(lambda law: law.initial_state(d[0], w[0]))
+    return jax.lax.scan(sample, start, (d, after[0], w, after[1], time))[1]

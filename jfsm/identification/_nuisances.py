@@ -248,12 +248,15 @@ class Nuisances:
             covariance = covariance * float(self.colour.louder)
         return replace(self, readings=readings, noise=noise, force_covariance=covariance)
 
+    def steps_for(self, structures: Sequence[Structure]) -> int:
+        """Steps per sample that are short enough for all of these structures."""
+        size, needed = typical_size(self.record), substeps_for if self.path is None else imposed_substeps
+        return max(needed(structure, self.record.dt, size) for structure in structures)
+
     def resolving(self, structures: Sequence[Structure], least: int = 1) -> "Nuisances":
         """The same record with steps short enough for all of these structures, so many per sample at `least`."""
         record, fine = self.record, self.fine
-        size = typical_size(record)
-        steps_for = substeps_for if self.path is None else imposed_substeps
-        need = max(least, *(steps_for(structure, record.dt, size) for structure in structures))
+        need = max(least, self.steps_for(structures))
         if need <= fine.substeps:
             return self
         if self.path is not None:
