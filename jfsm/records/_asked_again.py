@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 Found = TypeVar("Found")
 
-_KEPT = 64
+_KEPT = 16
 """Answers of a function that are kept, those asked for last."""
 
 
