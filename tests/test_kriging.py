@@ -451,9 +451,19 @@ def test_more_readings_than_points_are_merged_and_every_one_counts():
         return np.sqrt(np.mean((force_map.evaluate(queries) - smooth_force(queries)) ** 2))
 
     assert error(merged) < 0.4 * error(some)
-    assert 150 < len(merged.parts[0].states) <= 200
+    assert len(merged.parts[0].states) == 200
     assert "20000 readings were merged to means over" in merged.remarks[0]
     assert np.sqrt(merged.noise_variance) == pytest.approx(0.05, rel=0.5)  # of one reading, not of a mean
+
+
+@pytest.mark.parametrize("points", [2, 37, 60])
+def test_readings_in_fewer_places_than_points_are_merged_place_by_place(points):
+    places = scattered(40, seed=3)
+    states = np.repeat(places, 25, axis=0)
+    merged = readings.merge(readings.Checked(states, states[:, :1], np.ones(len(states))), points)
+    assert len(merged.states) == min(points, 40)
+    assert np.sum(1 / merged.relative_noise) == pytest.approx(1000)
+    np.testing.assert_allclose(merged.force, merged.states[:, :1])
 
 
 def test_a_mean_is_weighted_by_the_noise_of_its_readings():

@@ -27,6 +27,8 @@ SHORTEST, LONGEST = 64, 16384
 """Samples: a filter of 50 states keeps 20 kB for each."""
 TURN = 0.4
 """Largest angle [rad] by which the fastest motion turns in one step of Runge and Kutta's."""
+LEAST_STEPS, FINER = 2, 4
+"""Steps in a sample at least; more are so many times as many."""
 VAGUE = 10.0
 """Standard deviation of the trend beforehand, in sizes of the force."""
 PROCESS, DOUBT = 0.05, 2.0
@@ -184,10 +186,10 @@ def _recording(
 
 
 def _substeps(force_map: Kriging, states: Float[np.ndarray, "n 2"], mass: float, dt: float) -> int:
-    """Steps of Runge and Kutta's in a sample, by the slopes of a map: a power of two, for the sake of few programs."""
+    """Steps of Runge and Kutta's in a sample, by the slopes of a map: two, eight and so on, each with its programs."""
     stiff, damped = np.abs(np.asarray(force_map.evaluate_derivatives(states, ((1, 0), (0, 1))))).T / mass
     turn = float(np.quantile(np.sqrt(stiff) + damped, 0.99)) * dt
-    return 2 ** max(0, math.ceil(math.log2(turn / TURN)))
+    return LEAST_STEPS * FINER ** max(0, math.ceil(math.log(turn / TURN / LEAST_STEPS, FINER)))
 
 
 def _apart(

@@ -65,7 +65,10 @@ def memory_needed(points: int) -> int:
 
 
 def merge(readings: Checked, points: int) -> Checked:
-    """Means over the cells of the finest regular grid of which at most `points` cells hold readings.
+    """Means over cells of the finest regular grid of which at most `points` hold readings; the fullest are halved until
+    there are as many as `points`.
+
+    Every number of points has its own programs. Of readings in fewer places fewer are left.
 
     Notes
     -----
@@ -81,7 +84,9 @@ def merge(readings: Checked, points: int) -> Checked:
             few = middle
         else:
             many = middle
-    _, cell = np.unique(_cells(place, few), return_inverse=True)
+    cell, before = np.unique(_cells(place, few), return_inverse=True)[1], 0
+    while before < (count := int(cell.max()) + 1) < points:
+        cell, before = _halved(place, cell, points - count), count
     weight = 1.0 / readings.relative_noise
     total = np.bincount(cell, weight)
 
@@ -89,6 +94,21 @@ def merge(readings: Checked, points: int) -> Checked:
         return np.stack([np.bincount(cell, weight * column) / total for column in columns.T], axis=1)
 
     return Checked(mean(readings.states), mean(readings.force), 1.0 / total)
+
+
+def _halved(place: NDArray[np.float64], cell: NDArray[np.int64], most: int) -> NDArray[np.int64]:
+    """Cells (n,), up to `most` of them, the fullest, halved across their longer side; equal states stay together."""
+    count = np.bincount(cell)
+    mean = np.stack([np.bincount(cell, column) / count for column in place.T], axis=1)
+    apart = np.square(place - mean[cell])
+    width = np.stack([np.bincount(cell, column) for column in apart.T], axis=1)
+    wide = np.flatnonzero(np.any(width > 0, axis=1))
+    chosen = wide[np.argsort(-count[wide], kind="stable")[:most]]
+    number = np.full(len(count), -1)
+    number[chosen] = len(count) + np.arange(len(chosen))
+    rows, axis = np.arange(len(cell)), np.argmax(width, axis=1)[cell]
+    upper = (number[cell] >= 0) & (place[rows, axis] > mean[cell, axis])
+    return np.unique(np.where(upper, number[cell], cell), return_inverse=True)[1]
 
 
 def _cells(place: NDArray[np.float64], per_axis: int) -> NDArray[np.int64]:
