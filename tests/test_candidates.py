@@ -22,7 +22,7 @@ from jfsm.diagnosis._candidates import (
     promising,
 )
 from jfsm.diagnosis._effect import Effect
-from jfsm.identification import Nuisances, prepare
+from jfsm.identification import LANES, Nuisances, Posterior, prepare
 
 CHAIN = jfsm.Structure.chain([1.0, 1.0], [20.0, 20.0], [0.2, 0.2])
 
@@ -53,6 +53,20 @@ def test_places_that_are_given_are_the_only_ones(shaken):
     assert places("attached_oscillator", shaken, [(1, 2)]) == []
     assert places("attached_oscillator", shaken, [(0, 2), (1, 2)]) == [(0, 2)]
     assert places("preload", shaken, [(1, 2)]) == [(1, 2)]
+
+
+def test_programs_are_those_of_a_few_classes_of_laws_whatever_the_place(shaken):
+    needed: dict[tuple, set[str]] = {}
+    for candidate in candidates(CHAIN, [shaken], chosen_causes(None)):
+        for begin in candidate.starts[:LANES]:
+            seen = shaken.resolving([begin])
+            posterior = Posterior(hypothesis(CHAIN, [begin], [seen]), [seen])
+            needed.setdefault((posterior.program, seen.fine.substeps), set()).add(candidate.effects[0].cause.id)
+    shared = {name for names in needed.values() if len(names) > 1 for name in names}
+    assert shared > {"cubic_hardening", "force_gain", "coulomb", "stribeck", "jenkins", "bouc_wen"}
+    by_class = {program for program, _ in needed}
+    assert len(by_class) <= 6  # smooth, sliding, remembering, answering the past, a late force, a late channel
+    assert len(needed) <= 10  # and steps
 
 
 def test_the_whole_catalogue_fits_a_chain(shaken):
