@@ -144,7 +144,10 @@ def _newton(system: Field, starts: np.ndarray, shortest: float, reach: float) ->
 
 @eqx.filter_jit
 def _roots(system: Field, starts: Float[Array, "starts dof"], shortest, reach):
-    """Newton's method from every start with steps up to `reach`: displacements, and whether each is a point of rest."""
+    """Newton's method from every start with steps up to `reach`: displacements, and whether each is a point of rest.
+
+    `optimistix.Newton` knows no longest step, and would leave the box where a spring is almost flat.
+    """
     still = jnp.zeros(system.dof)
 
     def static(x):

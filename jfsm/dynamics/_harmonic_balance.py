@@ -6,7 +6,9 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import lineax as lx
 import numpy as np
+import optimistix as optx
 from jaxtyping import Array, Float
 
 from .._types import as_array
@@ -16,6 +18,7 @@ _ITERATIONS = 12
 _SLOW = 7
 _SETTLED = 1e-9
 """Last Newton step of a point that counts as found; being quadratic, it leaves rounding alone."""
+_NEWTON = optx.Newton(_SETTLED, _SETTLED, norm=optx.max_norm, linear_solver=lx.LU(), cauchy_termination=True)
 
 
 def tables(harmonics: int, samples: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -102,21 +105,17 @@ def solve(balance, guess: np.ndarray, row: np.ndarray, target: float) -> Solved:
 
 @eqx.filter_jit
 def _newton(balance, guess, row, target):
-    def bordered(q):
-        return jnp.concatenate([jax.jacfwd(balance)(q), row[None, :]])
+    """The point, the curve's direction there, what one more step would change, and how many were taken."""
 
-    def step(carry):
-        q, _, count = carry
-        change = jnp.linalg.solve(bordered(q), jnp.concatenate([balance(q), (row @ q - target)[None]]))
-        size = jnp.max(jnp.abs(q[balance.system.dof :]))  # of the motion; the mean may be larger
-        return q - change, jnp.max(jnp.abs(change)) / size, count + 1
+    def left(q, _=None):
+        return jnp.concatenate([balance(q), (row @ q - target)[None]])
 
-    def unsettled(carry):
-        _, moved, count = carry
-        return (moved > _SETTLED) & (count < _ITERATIONS)
-
-    q, moved, count = jax.lax.while_loop(unsettled, step, (guess, jnp.full((), jnp.inf), 0))
-    return q, jnp.linalg.solve(bordered(q), jnp.zeros_like(q).at[-1].set(1.0)), moved, count
+    found = optx.root_find(left, _NEWTON, guess, max_steps=_ITERATIONS, throw=False)
+    q = found.value
+    sides = jnp.stack([left(q), jnp.zeros_like(q).at[-1].set(1.0)], 1)
+    change, tangent = jnp.linalg.solve(jax.jacfwd(left)(q), sides).T
+    size = jnp.max(jnp.abs(q[balance.system.dof :]))  # of the motion; the mean may be larger
+    return q - change, tangent, jnp.max(jnp.abs(change)) / size, found.stats["num_steps"]
 
 
 def check_positive(**arguments: float) -> None:

@@ -378,7 +378,11 @@ class Closing(NamedTuple):
 
 @eqx.filter_jit
 def _close(flow: Flow, states, periods, rows) -> Closing:
-    """Close the orbits that begin at the given states, where the velocity that each row selects is zero."""
+    """Close the orbits that begin at the given states, where the velocity that each row selects is zero.
+
+    The last of Newton's steps keeps the flow's derivative, which tells stability: a root finder, `optimistix.Newton`,
+    would throw it away, and every orbit would be gone through once more.
+    """
     n = 2 * flow.dof
 
     def rate(carry):
