@@ -20,6 +20,14 @@ MASS, STIFFNESS, DAMPING, CUBIC = 2.0, 18.0, 0.5, 4.0
 MODEL = jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING)
 
 
+@pytest.fixture(autouse=True)
+def interruptible():
+    """As in a terminal; what runs in the background may have been told to ignore interrupts."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.fixture(scope="module")
 def record():
     """A Duffing oscillator from rest, which the model takes for a linear one."""
