@@ -223,7 +223,7 @@ class Study:
             more = [c for c in left_out if c.starts] + slow
         if more:
             tell = self.steps.of("more single causes")
-            found = found.and_then(search(more, given, refitted, problem, tell, known=found.trials))
+            found = found.and_then(search(more, given, refitted, problem, tell, known=told(found.trials)))
             left_out = [c for c in left_out if c not in more]
         left_out += [c for c in stiff if c in slow and c not in more]
         akin = self.steps.of("what is akin to the best")
