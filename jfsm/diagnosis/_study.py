@@ -203,9 +203,9 @@ class Study:
             return [t for t in trials if t is best or explained(t, refitted) >= GATE]
 
         tried, left_out = promising(every)
-        own = problem.first.steps_for([self.model])
+        steps = problem.first.steps_for([self.model])
         late = [c for c in tried if c.effects[0].cause.effect is ChannelDelay]  # they have a slow program of their own
-        stiff = [c for c in tried if c not in late and problem.first.steps_for(c.starts) >= _STIFF * own]
+        stiff = [c for c in tried if c not in late and problem.first.steps_for(c.starts) >= _STIFF * steps]
         now = [c for c in tried if c not in late and c not in stiff] or tried
         found = search(now, given, refitted, problem, self.steps.of("single causes"))
         slow = [c for c in (*late, *stiff) if c not in now]
@@ -218,7 +218,8 @@ class Study:
             more = contained([law for t in close(found.trials) for law in t.laws], left_out)
             others = [*as_promising(best.effects, every, left_out), *elsewhere(best.effects, left_out)]
             more += [c for c in dict.fromkeys(others) if c not in more]
-            more += [c for c in slow if c in late or c in as_promising(best.effects, every, stiff, least=1.0)]
+            likely = [*late, *as_promising(best.effects, every, stiff, least=1.0)]
+            more += [c for c in slow if c in likely]
         else:  # of a missing force that is ill seen regression may put the right law last
             more = [c for c in left_out if c.starts] + slow
         if more:
