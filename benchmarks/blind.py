@@ -6,7 +6,8 @@ One line of JSON per challenge is appended to the file as it is done; the same c
 `--two`, two effects of different families are hidden at once; with `--outside`, one that no catalogue names; with
 `--chain`, one at some place of two masses in a chain, where the place counts too; with `--dirt`, records are as a
 laboratory has them: coloured noise, steps, outliers, drift, half a sample of delay. `--page` writes who was taken for
-whom, calibration, gain and time as a page, and the figures as JSON beside it.
+whom, calibration, gain and time as a page, and the figures as JSON beside it. `--cards` keeps what every verdict rests
+on, which `benchmarks/replay.py` judges anew in seconds.
 """
 
 import argparse
@@ -21,6 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.blind_page import write_page  # noqa: E402  (needs the line above when run as a script)
 from benchmarks.blind_table import Row, exact, hidden, said, spot, table  # noqa: E402
+from benchmarks.cards import asking_widely, keep_card  # noqa: E402
 from benchmarks.rows import ONE_CORE, in_processes, keep, kept  # noqa: E402
 from tests.blind import (  # noqa: E402
     CAUSES,
@@ -49,16 +51,35 @@ ROWS_PER_PROCESS = 15
 Drawing = dict[str, Any]
 
 
-def examine(seed: int, drawing: Drawing) -> Row:
+def examine(seed: int, drawing: Drawing, cards: Path | None = None) -> Row:
     """The challenge of a seed put to the library, as one row; an exception becomes the row's "error".
 
-    Of a seed that gives no fair challenge the row says that alone, as "unfair".
+    Of a seed that gives no fair challenge the row says that alone, as "unfair". What the verdict rests on is kept among
+    the `cards`.
     """
     try:
         challenge = drawn(seed, drawing)
     except UnfairError as problem:
         return {"seed": seed, "unfair": str(problem)}
-    return question(challenge) | {"drawing": drawing} | attempted(lambda: diagnosed(challenge))
+    truth = question(challenge)
+
+    def asked() -> Any:
+        if cards is None:
+            return diagnosed(challenge)
+        with asking_widely():
+            found = diagnosed(challenge)
+        keep_card(cards, f"{_kind(drawing)}-{seed}", found, truth)
+        return found
+
+    return truth | {"drawing": drawing} | attempted(asked)
+
+
+def _kind(drawing: Drawing) -> str:
+    """What is drawn, in a word."""
+    if set(drawing["causes"]) <= set(OUTSIDE):
+        return "outside"
+    kinds = [name for name in ("two", "chain") if drawing.get(name)]
+    return next(iter([*kinds, *filter(None, [drawing.get("dirt")])]), "single")
 
 
 def attempted(diagnose: Callable[[], Any]) -> Row:
@@ -181,9 +202,9 @@ def earlier_rows(path: Path, drawing: Drawing) -> list[Row]:
     return rows
 
 
-def answers(seeds: Sequence[int], drawing: Drawing, jobs: int) -> Iterator[Row]:
+def answers(seeds: Sequence[int], drawing: Drawing, jobs: int, cards: Path | None = None) -> Iterator[Row]:
     """Rows of these seeds as they are done, from `jobs` processes of one core each."""
-    return in_processes(examine, [(seed, drawing) for seed in seeds], jobs, ROWS_PER_PROCESS, ONE_CORE)
+    return in_processes(examine, [(seed, drawing, cards) for seed in seeds], jobs, ROWS_PER_PROCESS, ONE_CORE)
 
 
 def progress_line(row: Row, done: int, total: int, elapsed: float) -> str:
@@ -201,7 +222,14 @@ def progress_line(row: Row, done: int, total: int, elapsed: float) -> str:
     )
 
 
-def run(seeds: Sequence[int], drawing: Drawing, jobs: int, out: Path | None, say: Callable[[str], None]) -> list[Row]:
+def run(
+    seeds: Sequence[int],
+    drawing: Drawing,
+    jobs: int,
+    out: Path | None,
+    say: Callable[[str], None],
+    cards: Path | None = None,
+) -> list[Row]:
     """Rows of all seeds: those in the file already, and the others as examined now and appended to it."""
     rows = [row for row in earlier_rows(out, drawing) if row["seed"] in seeds] if out else []
     missing = sorted(set(seeds) - {row["seed"] for row in rows})
@@ -209,7 +237,7 @@ def run(seeds: Sequence[int], drawing: Drawing, jobs: int, out: Path | None, say
         say(f"{len(rows)} done before, {len(missing)} to do")
     begin = time.perf_counter()
     try:
-        for done, row in enumerate(answers(missing, drawing, jobs) if missing else (), start=1):
+        for done, row in enumerate(answers(missing, drawing, jobs, cards) if missing else (), start=1):
             if "unfair" in row:
                 say(f"seed {row['seed']} is left out: {row['unfair']}")
                 continue
@@ -237,6 +265,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--channels", nargs="+", choices=list(CHANNEL_SETS | CHAIN_SETS), help="all by default")
     parser.add_argument("--excitation", nargs="+", default=list(DRIVES), choices=list(DRIVES))
     parser.add_argument("--out", type=Path, help="file of JSON lines to append to and to resume from")
+    parser.add_argument("--cards", type=Path, help="folder for what verdicts rest on, for benchmarks/replay.py")
     parser.add_argument("--page", type=Path, help="HTML file for pictures and figures; the figures as JSON beside it")
     given = parser.parse_args(arguments)
     if given.page and given.page.suffix != ".html":
@@ -258,7 +287,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if given.dirt:
         drawing["dirt"] = given.dirt
         drawing["causes"] = [cause for cause in drawing["causes"] if cause not in TAKEN_FOR.get(given.dirt, ())]
-    rows = run(range(given.seed, given.seed + given.n), drawing, given.jobs, given.out, lambda s: print(s, flush=True))
+    seeds = range(given.seed, given.seed + given.n)
+    rows = run(seeds, drawing, given.jobs, given.out, lambda s: print(s, flush=True), given.cards)
     rows = sorted(rows, key=lambda row: row["seed"])
     if rows:
         print("\n" + table(rows))

@@ -5,10 +5,10 @@ from dataclasses import replace
 import jax
 import numpy as np
 import pytest
+from jfsm.diagnosis._adequacy import NEGLIGIBLE, adequate
 
 import jfsm
 from jfsm.demo import DAMPING, FRICTION, MASS, STIFFNESS, hidden_friction
-from jfsm.diagnosis._adequacy import NEGLIGIBLE, adequate
 from jfsm.diagnosis._chance import beside_chance, noise_beyond
 from jfsm.diagnosis._gain import BASE, remeasured
 from jfsm.diagnosis._problem import Problem

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from jfsm.diagnosis._decide import Decision, decide, first_alone
 
 import jfsm
 from jfsm.diagnosis._clipped import beside_clipping
-from jfsm.diagnosis._decide import Decision, decide, first_alone
 from jfsm.diagnosis._diagnose import _closes_too_little, _speaks_against
 from jfsm.diagnosis._effect import Effect
 from jfsm.diagnosis._enough import settled, something_left

@@ -131,6 +131,7 @@ def diagnose(
     what_next: Annotated[
         bool, typer.Option("--next", help="Also say what test would tell the two likeliest causes apart.")
     ] = False,
+    why: Annotated[bool, typer.Option("--why", help="Also show the checks that decided the verdict.")] = False,
     time_limit: Annotated[
         float | None, option("Seconds after which the best verdict so far is given; so does Ctrl-C.", "SECONDS")
     ] = None,
@@ -163,6 +164,8 @@ def diagnose(
     if extended is not None:
         d.extended.save(extended)
     d.print()  # last, so that a reader who closes the pipe loses no file
+    if why:
+        typer.echo(d.why())
     if not d.finished:
         raise typer.Exit(NOT_FINISHED)
     if what_next:
@@ -214,6 +217,24 @@ def report(
     check_outputs({"--report": report}, [numbers])
     write_text_atomically(report, render_json(numbers))
     typer.echo(f"The page is {report.resolve()}.")
+
+
+@command
+def why(
+    numbers: Annotated[
+        Path, typer.Argument(metavar="JSON", help="What `jfsm diagnose --json` wrote.", show_default=False)
+    ],
+    cause: Annotated[
+        str | None, typer.Argument(metavar="CAUSE", help="What became of this cause; the verdict without it.")
+    ] = None,
+) -> None:
+    """Show the checks that decided a verdict, or what became of one cause."""
+    from ..reporting import print_why, read_diagnosis
+
+    try:
+        print_why(read_diagnosis(numbers), cause)
+    except LookupError as error:
+        raise ValueError(str(error.args[0])) from None
 
 
 @command

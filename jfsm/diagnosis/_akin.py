@@ -14,13 +14,14 @@ from ..structures import (
     QuadraticStiffness,
     Structure,
 )
-from ._adequacy import SIGNIFICANT, adequate
 from ._begin import Begin, found_in, own_part
 from ._candidates import SHAPES, Candidate, Laws, alone_there, at_rest, contained, may_rest_anywhere
 from ._effect import Effect
 from ._problem import Problem
 from ._score import promised
 from ._trial import Trial
+from .evidence.excess import is_noise_only
+from .thresholds import THRESHOLDS
 
 _BESIDE_A_SPRING: Mapping[type[AbstractTerm], type[AbstractTerm]] = {EndStop: DeadZone, DeadZone: EndStop}
 """Laws that are another one with the same numbers beside a spring: play in a spring is a stop beside a softer one."""
@@ -66,8 +67,8 @@ def instead_of(
     cases, begin = [], found_in(t)
     for (effect, _), best in zip(placed, promised(t, law, laws, [s for _, s in placed], problem), strict=True):
         # What comes close has been at a top of its own: to promise more than that, before its numbers move, is much.
-        least = close.get(effect, t.evidence + SIGNIFICANT)
-        if best[0][1] > least or (effect not in close and not adequate(t)):
+        least = close.get(effect, t.evidence + THRESHOLDS.significant)
+        if best[0][1] > least or (effect not in close and not is_noise_only(t)):
             starts = tuple(problem.model + shape.term for shape, _ in best[:SHAPES])
             cases.append(Candidate((effect,), starts, begin=begin))
     return cases

@@ -1,17 +1,16 @@
 """Whether records of one structure differ in what they should share."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
-from ._adequacy import GATE, adequate, explained, unexplained
-from ._standing import UNPREDICTED
 from ._trial import Trial
+from .evidence.excess import explained, is_noise_only, unexplained
+from .thresholds import THRESHOLDS
 
 _APART = 3.0
-"""Standard errors between two records from which a number differs between them,"""
-_OPEN = 0.3
-"""and share of the smallest from which a law is not the same in both."""
+"""Standard errors between two records from which a number differs between them."""
 
 
 class Difference(NamedTuple):
@@ -21,10 +20,10 @@ class Difference(NamedTuple):
     intervals: tuple[tuple[float, float, float], ...]
 
     @property
-    def wide(self) -> bool:
-        """Whether it differs by more than a law's number may."""
+    def ratio(self) -> float:
+        """Its largest size in a record, in those of the smallest in another."""
         sizes = [abs(value) for value, _, _ in self.intervals]
-        return max(sizes) > (1.0 + _OPEN) * min(sizes)
+        return max(sizes) / min(sizes) if min(sizes) > 0 else math.inf
 
 
 def differ(apart: Trial, shared: Trial) -> bool:
@@ -32,8 +31,10 @@ def differ(apart: Trial, shared: Trial) -> bool:
 
     No two measured records are quite alike: they must explain half of what the other leaves, if it leaves anything.
     """
-    tells = not np.any(unexplained(shared)) and adequate(apart)
-    return apart.evidence - shared.evidence > UNPREDICTED and (tells or explained(apart, shared) >= GATE)
+    tells = not np.any(unexplained(shared)) and is_noise_only(apart)
+    return apart.evidence - shared.evidence > THRESHOLDS.searched and (
+        tells or explained(apart, shared) >= THRESHOLDS.half
+    )
 
 
 def differences(t: Trial) -> list[Difference]:

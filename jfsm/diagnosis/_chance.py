@@ -16,10 +16,10 @@ from ..dynamics._grid import Fine
 from ..identification import Nuisances
 from ..records import Record
 from ..structures import Clipping
-from ._adequacy import adequate, white
 from ._gain import BASE, remeasured
 from ._problem import Problem
 from ._trial import Prediction, Trial, ended, extent, free_run, predict, runs_away, sets
+from .evidence.excess import is_noise_only, white
 
 _DRAWS = 6
 
@@ -29,7 +29,7 @@ def beside_chance(trials: Sequence[Trial], problem: Problem, key: jax.Array) -> 
     model, records = problem.model, problem.records
     best = max(trials, key=lambda t: t.evidence)
     limits = any(isinstance(sensor, Clipping) for sensor in model.sensors)
-    if adequate(best) or not white(best) or limits or problem.imposed or problem.limit.over:
+    if is_noise_only(best) or not white(best) or limits or problem.imposed or problem.limit.over:
         return list(trials)
     posterior = problem.posterior_of(best)
     runs = [free_run(posterior, best.theta, index) for index in range(len(records))]

@@ -1,7 +1,6 @@
 """Channels that their recorder limited: seen in the record itself, before anything is fitted."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -9,9 +8,7 @@ from ..identification import LEAST_SAMPLES
 from ..records import Record, defects
 from ..structures import Clipping, Structure, causes
 from ._class import class_of
-from ._decide import Decision
 from ._diagnosis import Estimate, Finding
-from ._trial import Trial
 
 PROBABILITY = 0.99
 """That samples at one level are clipped ones: noise does not come back to a level by itself."""
@@ -37,20 +34,6 @@ def limited(records: Sequence[Record], model: Structure) -> list[Clipping]:
             if channel not in known and cut.mean() > _NOTICEABLE and np.all(there >= size * (1 - _SAME)):
                 found[channel] = max(size, found.get(channel, 0.0))
     return [Clipping(limit, at=channel) for channel, limit in found.items()]
-
-
-def beside_clipping(decision: Decision, sensors: Sequence[Clipping], refitted: Trial) -> Decision:
-    """A decision once channels are known to be clipped.
-
-    They are a cause whatever else cannot be told. A clipped force drives with peaks that are guessed: what they leave
-    is no effect of its own.
-    """
-    if decision.verdict in ("consistent", "parameters"):
-        return replace(decision, verdict="cause")
-    guessed = any(sensor.at[0] == "force" for sensor in sensors)
-    if decision.verdict == "undecided" or (decision.verdict == "unnamed" and guessed):
-        return replace(decision, verdict="cause", winner=refitted)
-    return decision
 
 
 def finding(sensor: Clipping, unit: str) -> Finding:

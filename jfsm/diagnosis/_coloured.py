@@ -6,10 +6,10 @@ import numpy as np
 
 from ..identification import Nuisances, Posterior
 from ..records import rolloff
-from ._adequacy import white
 from ._problem import Problem
-from ._standing import UNPREDICTED
 from ._trial import Trial, standardised
+from .evidence.excess import white
+from .thresholds import THRESHOLDS
 
 _FALLS = 3.0
 """Nats by which the upper part of a channel's spectrum has to speak for a memory of its noise."""
@@ -42,7 +42,7 @@ def coloured(beside: Trial, problem: Problem) -> Problem | None:
     again = other.posterior_of(beside)
     theta = again.at_the_floor(beside.theta)
     before, after = (float(p.values(t[None])[0]) for p, t in ((posterior, beside.theta), (again, theta)))
-    if before - after < UNPREDICTED:
+    if before - after < THRESHOLDS.searched:
         return None
     return other if all(_uncorrelated(again, theta, index) for index in range(count)) else None
 

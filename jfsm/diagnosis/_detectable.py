@@ -26,12 +26,11 @@ import numpy as np
 from .._threads import compiled_once, side_by_side
 from ..identification import Posterior, prior
 from ..structures import Preload, Structure, is_offset
-from ._adequacy import NOTICEABLE, SIGNIFICANT
 from ._candidates import Candidate, modest, own_paths
 from ._effect import Effect
 from ._problem import Problem
-from ._standing import UNPREDICTED
 from ._trial import SLACKS, Trial, ended, extent, sets, windows
+from .thresholds import THRESHOLDS
 
 _SPARED = 1.28
 """Standard deviations of chance that an effect has to spare: nine of ten then pass."""
@@ -178,7 +177,9 @@ class _Seen:
         [effect] = self.effects
         # Own values may make up for a sensor's fault: it has to be likelier than they are, by no margin. A law may have
         # to beat a refit that leaves nothing.
-        least = SIGNIFICANT if effect.cause.is_sensor or effect.cause.effect is Preload else UNPREDICTED
+        least = (
+            THRESHOLDS.significant if effect.cause.is_sensor or effect.cause.effect is Preload else THRESHOLDS.searched
+        )
         return max(
             _NAMED * _significant(beside_refit[np.ix_(grows, grows)], 0.0 if effect.cause.is_sensor else least, cost),
             _NAMED * _significant(beside_given[np.ix_(grows, grows)], least + self.silence.spared, cost),
@@ -211,7 +212,7 @@ def _noticeable(posterior: Posterior, theta: np.ndarray, gone: np.ndarray, given
     something is missing.
     """
     left, moved = (np.array(part) for part in zip(*(_powers(posterior, theta, gone, s) for s in SLACKS), strict=True))
-    least = NOTICEABLE * given.prediction.expected + _SPARED * given.prediction.scatter
+    least = THRESHOLDS.noticeable * given.prediction.expected + _SPARED * given.prediction.scatter
     with np.errstate(divide="ignore", invalid="ignore"):
         needed = np.maximum(least - (left - left[0]), 0.0) / moved
     return math.sqrt(float(np.min(np.max(np.nan_to_num(needed, nan=math.inf, posinf=math.inf), 0))))

@@ -2,7 +2,6 @@
 
 import secrets
 from collections.abc import Sequence
-from functools import partial
 
 import jax
 
@@ -10,39 +9,27 @@ from .._limit import Limit, ended_by_interrupt
 from .._programs import programs_kept
 from .._types import require_x64
 from ..dynamics import Reconstruction
-from ..identification import Nuisances
 from ..records import Record
 from ..reporting import shown_by_default
-from ..structures import Cause, Clipping, Structure
-from ._adequacy import ALMOST_ALL, GATE, NEGLIGIBLE, adequate
-from ._between import differences
+from ..structures import Cause, Structure
 from ._candidates import Candidate, chosen_causes
-from ._chance import noise_levels
-from ._clipped import beside_clipping, limited
-from ._decide import Decision, decide, first_alone
+from ._clipped import limited
 from ._detectable import Silence, detectable, naturally_detectable
 from ._diagnosis import Diagnosis
-from ._forgiving import forgiving
-from ._gain import Gain, StructureOf, measure_gain
 from ._holdout import HeldOut, split
 from ._late import Late, in_time, showing_late, slightly_late
 from ._next import Leading
 from ._problem import Problem
-from ._report import Tested, assemble
-from ._residual import residual, stand_in
-from ._standing import UNPREDICTED
+from ._report import Reached, Tested, assemble
+from ._residual import residual
 from ._steps import Progress, Steps
 from ._study import Searched, Study
 from ._trial import Trial
 from ._unfinished import Unfinished
-from ._untold import in_step, untold
 from ._wandering import steadied
+from ._weighed import HeldOutRuns, Weighed
+from .verdict.judge import judge
 
-_WORSE = 1.5
-"""Error on held-out readings, in errors of the model as given and in those that noise leaves, from which a cause makes
-the model worse, though it leaves noise only over some periods."""
-_SURELY = 2 * UNPREDICTED
-"""Nats by which a law that leaves noise only is ahead of its absence, so that no prediction has to show it."""
 _ROUNDS = 3
 """Times that a record is looked into, at most, in which channels turn out to be late by less than a sample."""
 
@@ -151,12 +138,16 @@ def _diagnosed(
     study = Study(model, chosen, places, reconstruction, key, steps, limit, pairs=max_causes > 1)
     problem, every, found, held, late = _looked_into(record, holdout, study)
     steps.next("the verdict, and its gain on held-out readings")
-    judged, tried, decision, extended, gain, runs = _concluded(found, problem, clipped, model, stated, held, key)
-    first, fitted, refitted = judged.first, judged.until[0], tried.refitted
+    weighed = Weighed(found, problem, clipped, HeldOutRuns(stated, model, held, key))
+    decision = judge(weighed.evidence)
+    behind = weighed.behind(decision)
+    judged, tried, winner = behind.problem, behind.found, behind.trial(decision.winner)
+    extended, (gain, runs) = behind.extended(decision), behind.gain(decision)
     steps.next("the missing force")
-    term = decision.named_term
+    term = next(iter(winner.laws), None) if decision.verdict == "cause" else None
+    first, fitted, refitted = judged.first, judged.until[0], tried.refitted
     # Shown beside a law is the force that it stands for, with the own values that go with it.
-    lacking = refitted.structure if term is None else decision.winner.structure.without(term)
+    lacking = refitted.structure if term is None else winner.structure.without(term)
     at = term.at if term is not None and term.at in lacking.links else None
     missing = residual(lacking, steadied(first), fitted, at)
     silence = Silence(tried.given, refitted, judged)
@@ -167,11 +158,12 @@ def _diagnosed(
         seen = detectable(tried.trials, silence)
     if decision.verdict != "consistent":
         extended = showing_late(extended, late)
-    unfinished = Unfinished.of(chosen, tried, limit, cut=decision.cut, pairs=study.pairs)
+    unfinished = Unfinished.of(chosen, tried, limit, cut=not decision.finished, pairs=study.pairs)
     tested = Tested(tried.trials, tried.behind, tried.left_out, seen, tried.lack.known, unfinished)
-    leading = Leading.of(model, [refitted, *tried.trials], decision.share, first, fitted)
+    leading = Leading.of(model, [refitted, *tried.trials], lambda t: decision.probability(t.key), first, fitted)
     steps.end()
-    return assemble(decision, clipped, refitted, tested, judged, extended, missing, gain, runs, leading)
+    reached = Reached(decision, winner, term, weighed.evidence)
+    return assemble(reached, clipped, refitted, tested, judged, extended, missing, gain, runs, leading)
 
 
 def _looked_into(
@@ -197,133 +189,3 @@ def _looked_into(
             break
     assert reached is not None
     return reached
-
-
-def _decided(found: Searched, problem: Problem, *, lasting: bool) -> tuple[Problem, Searched, Decision]:
-    """The verdict; where no cause is named, that of records of which a share of the force is forgiven to all.
-
-    Where the model is wrong in a `lasting` run its predictions over some periods do not make it consistent.
-    """
-    periods, limit = sum(n.record.duration / n.period for n in problem.records), problem.limit
-
-    def decision_of(found: Searched, problem: Problem, **how) -> Decision:
-        mapped = (lambda t: None) if limit.over else partial(stand_in, problem=problem)
-
-        def decided(trials: Sequence[Trial]) -> Decision:
-            return decide(found.given, found.refitted, trials, mapped, found.lack, periods, **how)
-
-        decision = first_alone(decided(found.trials), found.trials, found.refitted, decided)
-        # What a law depends on is open where its numbers are not the same in all records.
-        varies = any(d.wide and d.path not in problem.model.entries() for d in differences(decision.winner))
-        return decision.open() if decision.verdict == "cause" and varies else decision
-
-    told = {"untold": untold(problem.records), "in_step": in_step(problem.records), "lasting": lasting}
-    cut = limit.over
-    decision = decision_of(found, problem, imposed=problem.imposed, **told)
-    again = None if decision.winner.effects or cut else forgiving(found.every, problem)
-    if cut or (again is not None and limit.over):
-        return problem, found, decision.cut_short(found.refitted)
-    if again is None:
-        return problem, found, decision
-    problem, (given, refitted, *trials) = again
-    found = found.judged_in(problem, given, refitted, trials)
-    return problem, found, decision_of(found, problem, forgiven=True, lasting=lasting)
-
-
-def _concluded(
-    found: Searched,
-    problem: Problem,
-    clipped: Sequence[Clipping],
-    model: Structure,
-    stated: Structure,
-    held: Sequence[HeldOut],
-    key: jax.Array,
-) -> tuple[Problem, Searched, Decision, Structure, Gain | None, list[dict]]:
-    """The verdict as held-out readings leave it, what it rests on, and what `_confirmed` tells beside.
-
-    It is reached anew where predictions over some periods make the model consistent and the whole run does not.
-    """
-
-    def concluded(*, lasting: bool):
-        judged, tried, decision = _decided(found, problem, lasting=lasting)
-        if clipped:
-            decision = beside_clipping(decision, clipped, tried.refitted)
-        confirmed = _confirmed(decision, tried, model, stated, held, judged.first, key, lasting=lasting)
-        return judged, tried, *confirmed
-
-    reached = concluded(lasting=False)
-    _, _, decision, _, gain, _ = reached
-    out_of_step = decision.verdict == "consistent" and gain is not None and _falls_out_of_step(gain)
-    return concluded(lasting=True) if out_of_step else reached
-
-
-def _confirmed(
-    decision: Decision,
-    tried: Searched,
-    model: Structure,
-    stated: Structure,
-    held: Sequence[HeldOut],
-    first: Nuisances,
-    key: jax.Array,
-    *,
-    lasting: bool,
-) -> tuple[Decision, Structure, Gain | None, list[dict]]:
-    """The decision as held-out readings leave it, the structure to go on with, its gain, and the runs behind that.
-
-    The gain is that over the model as it was `stated`; where the model is wrong in a `lasting` run alone, that run
-    decides.
-    """
-
-    refitted, ahead = tried.refitted, decision.winner.evidence - max(tried.given.evidence, tried.refitted.evidence)
-
-    def gained(extended: StructureOf) -> tuple[Gain | None, list[dict]]:
-        if not held:
-            return None, []
-        noise = noise_levels(decision.winner, first)
-        return measure_gain(stated, refitted.extended, extended, held, noise, first, key)
-
-    extended = (lambda record: model) if decision.verdict == "consistent" else decision.winner.extended
-    gain, runs = gained(extended)
-    if gain is not None and (against := _speaks_against(gain, decision, ahead, lasting=lasting)):
-        decision = decision.refused(against, refitted)
-        extended = refitted.extended
-        gain, runs = gained(extended)
-    elif gain is not None and _closes_too_little(gain, decision):
-        decision = decision.open()
-    if gain is not None and (by_class := decision.by_class()) is not None:
-        confirmed, runs_of_it = gained(by_class.winner.extended)
-        if confirmed is not None and confirmed.closed >= ALMOST_ALL:
-            return by_class, by_class.winner.extended(), confirmed, runs_of_it
-    return decision, extended(None), gain, runs
-
-
-def _falls_out_of_step(gain: Gain) -> bool:
-    """Whether the model, right over some periods, is wrong in the whole run over held-out readings, refitted or not."""
-    return min(gain.before, gain.refitted) > _WORSE * max(gain.floor, NEGLIGIBLE)
-
-
-def _closes_too_little(gain: Gain, decision: Decision) -> bool:
-    """Whether a cause that leaves more than noise closes less than half of the error of a run over held-out readings.
-
-    Where it leaves noise only, it is the motion that no run follows for long.
-    """
-    unsettled = decision.verdict == "cause" and bool(decision.winner.effects) and not adequate(decision.winner)
-    return unsettled and gain.closable and gain.interval[1] < GATE
-
-
-def _speaks_against(gain: Gain, decision: Decision, ahead: float, *, lasting: bool = False) -> str:
-    """Why runs on held-out readings speak against what was found, so many nats `ahead` of no effect; or nothing."""
-    leaves_something = decision.verdict == "cause" and not adequate(decision.winner)
-    worse = gain.after > _WORSE * max(gain.before, gain.floor)
-    if decision.verdict in ("cause", "unnamed") and (worse or (leaves_something and gain.harmful)):
-        return "runs worse on held-out readings than the model as given"
-    unsure = leaves_something and decision.share(decision.winner) < 0.5
-    if unsure and not (gain.closable and gain.significant):
-        return "is not likely, leaves something, and is not confirmed by held-out readings"
-    unpredicted = decision.verdict == "cause" and decision.winner.laws and decision.kappa[id(decision.winner)] == 0.0
-    sure = ahead > _SURELY and adequate(decision.winner)
-    if unpredicted and not sure and not (gain.closable and gain.significant):
-        return "explains nothing that predictions leave, and is not confirmed by held-out readings"
-    if (decision.verdict == "unnamed" or lasting) and gain.closable and gain.closed < GATE:
-        return "closes less than half of the error on held-out readings"
-    return ""

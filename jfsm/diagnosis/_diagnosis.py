@@ -8,9 +8,10 @@ from typing import Any
 
 import jax
 
-from ..structures import Structure
+from ..structures import Structure, causes
 from ._gain import Gain
 from ._next import Leading, Proposal, proposals
+from .verdict.decision import Decision
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,13 @@ class CandidateResult:
     unfit: float | None = None
 
 
+class Explanation(str):
+    """Text that shows itself as it reads, in lines."""
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
 @dataclass(frozen=True, repr=False)
 class Diagnosis:
     """What is wrong, why, how sure, and what mending it is worth; see the fields' own classes."""
@@ -94,6 +102,8 @@ class Diagnosis:
     """What `data` says, but for what is drawn."""
     drawn: Callable[[], dict[str, Any]]
     """Makes what is drawn. It takes a map of the missing force, which nothing else needs."""
+    decision: Decision
+    """How the verdict was reached: every check with what was measured, its limit and its outcome."""
     leading: Leading | None = None
     """The two most probable explanations, where there are two; None otherwise."""
     finished: bool = True
@@ -127,6 +137,29 @@ class Diagnosis:
         if self.leading is None:
             return []
         return proposals(self.leading, jax.random.key(0) if key is None else key, progress)
+
+    def why(self, cause: str | None = None) -> "Explanation":
+        """The checks that decided the verdict, or those of one cause, in words.
+
+        Parameters
+        ----------
+        cause : str, optional
+            Id of a cause, also of one that lost early or was never fitted, or the key of a hypothesis (``given``,
+            ``refitted``, ``coulomb@0-1``).
+
+        Raises
+        ------
+        ValueError
+            If there is no such cause.
+        """
+        from ..reporting import why_text
+
+        try:
+            return Explanation(why_text(self.told, cause))
+        except LookupError as error:
+            if cause in causes():
+                return Explanation(f"{cause} was not looked for.\n")
+            raise ValueError(f"`cause` must be the id of a cause; got {cause!r}. {error}") from None
 
     def print(self) -> None:
         """Verdict, findings and gain on the terminal."""

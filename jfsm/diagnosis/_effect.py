@@ -23,6 +23,11 @@ def names(effects: Sequence[Effect]) -> str:
     return " + ".join(effect.cause.id for effect in effects)
 
 
+def key_of(effects: Sequence[Effect]) -> str:
+    """Their ids with their places: ``coulomb@0-1+accel_gain@acceleration:1``."""
+    return "+".join(f"{e.cause.id}@{(':' if e.cause.is_sensor else '-').join(map(str, e.at))}" for e in effects)
+
+
 def places(effects: Sequence[Effect]) -> tuple:
     """The place of one effect, the places of several."""
     return effects[0].at if len(effects) == 1 else tuple(effect.at for effect in effects)

@@ -7,9 +7,10 @@ import numpy as np
 
 from .._threads import side_by_side
 from ..identification import settle
-from ._adequacy import NEARLY_ALL, explained
 from ._problem import Problem
 from ._trial import Trial, predict, trial
+from .evidence.excess import explained
+from .thresholds import THRESHOLDS
 
 _SHARES = (0.03, 0.01, 0.003, 0.001)
 """Shares of the elastic force that may be forgiven."""
@@ -28,7 +29,7 @@ def forgiving(trials: Sequence[Trial], problem: Problem) -> tuple[Problem, list[
     """
     given, refitted, *others = trials
     least = max(given.evidence, refitted.evidence)
-    if not any(t.evidence < least and explained(t, refitted) >= NEARLY_ALL for t in others):
+    if not any(t.evidence < least and explained(t, refitted) >= THRESHOLDS.nearly_all for t in others):
         return None
     leader = min(trials, key=lambda t: t.rung)
     posteriors = {share: _forgiven(problem, share).posterior_of(leader) for share in _SHARES}

@@ -21,13 +21,12 @@ from ..structures import Structure
 from ._holdout import HeldOut
 from ._trial import FILTERED, PREDICTED
 from ._wandering import steady
+from .evidence.held_out import HeldOutErrors, share_closed
 
 _LEAD = 50.0
 """Periods, at most, that lead a structure that remembers to what was held out."""
 _END = 20
 """One in so many samples of an imposed motion is its end."""
-_CLOSABLE = 1.05
-"""Error before, in floors, from which there is anything to close."""
 _DRAWS = 4
 """Draws of noise that show what it leaves of a perfect model's run."""
 _BLOCK, _FEWEST, _MOST_BLOCKS = 2.0, 5, 20
@@ -55,55 +54,19 @@ class ChannelGain:
     @property
     def closed(self) -> float:
         """Share of the closable error that is closed."""
-        return _closed(self.before, self.after, self.floor)
+        return share_closed(self.before, self.after, self.floor)
 
 
 @dataclass(frozen=True)
-class Gain:
-    """Errors of free runs on held-out readings, as shares of the channels' spreads (root of the mean over channels).
+class Gain(HeldOutErrors):
+    """Errors of free runs on held-out readings, in all and by channel; see `HeldOutErrors`."""
 
-    `before` is the model as given, `refitted` its own values refitted, `after` the extended model, `floor` what noise
-    in the drive, in the start and in the readings would leave.
-    """
-
-    before: float
-    refitted: float
-    after: float
-    floor: float
     channels: dict[str, ChannelGain]
-    interval: tuple[float, float]
-    """95 % interval of `closed`, from blocks of the held-out readings drawn anew."""
 
     @property
-    def closable(self) -> bool:
-        """Whether the model as given leaves more than noise would."""
-        return _closable(self.before, self.floor)
-
-    @property
-    def significant(self) -> bool:
-        """Whether the extended model predicts better by more than chance."""
-        return self.interval[0] > 0
-
-    @property
-    def harmful(self) -> bool:
-        """Whether the extended model predicts worse by more than chance."""
-        return self.closable and self.interval[1] < 0
-
-    @property
-    def closed(self) -> float:
-        """Share of the closable error that is closed: (before - after) / (before - floor), at most 1.
-
-        0 where there was nothing to close.
-        """
-        return _closed(self.before, self.after, self.floor)
-
-
-def _closed(before: float, after: float, floor: float) -> float:
-    return min((before - after) / (before - floor), 1.0) if _closable(before, floor) else 0.0
-
-
-def _closable(before: float, floor: float) -> bool:
-    return before > _CLOSABLE * floor
+    def errors(self) -> HeldOutErrors:
+        """Those of all channels together."""
+        return HeldOutErrors(self.before, self.refitted, self.after, self.floor, self.interval)
 
 
 def _window(samples: int, period: float) -> int:
@@ -225,7 +188,7 @@ def _interval(blocks: np.ndarray, floor: float, rng: np.random.Generator) -> tup
     B. Efron, R. J. Tibshirani, An Introduction to the Bootstrap, 1993, ch. 13 (percentile interval).
     """
     drawn = blocks[rng.integers(len(blocks), size=(_RESAMPLED, len(blocks)))]
-    closed = [_closed(before, after, floor) for before, after in np.sqrt(drawn.mean(1))]
+    closed = [share_closed(before, after, floor) for before, after in np.sqrt(drawn.mean(1))]
     low, high = np.quantile(closed, [0.025, 0.975])
     return float(low), float(high)
 

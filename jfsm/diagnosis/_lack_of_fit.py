@@ -5,7 +5,6 @@ the readings is in them.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from ..identification import Posterior, missing_force
 from ._problem import Problem
 from ._score import moved, regressed
 from ._trial import Trial, free_run, runs_away
+from .evidence.scorecard import OtherShapes
 
 _DEGREE = 5
 """Of the polynomials in displacement and velocity."""
@@ -21,24 +21,14 @@ _FARTHEST = 4.0
 """Standard deviations of the motion beyond which a shape stays as it is there."""
 
 
-class Unfit(NamedTuple):
-    """What other shapes would gain beside a hypothesis: nats beyond what noise lets them in the mean, and the share of
-    its innovations' power that they explain; and how far its run over what was fitted strays, as a share of the signal.
-    """
-
-    nats: float
-    share: float = 0.0
-    strays: float = 0.0
-
-
 class LackOfFit:
     """What other shapes would gain beside trials of a problem; asked again, it remembers."""
 
     def __init__(self, problem: Problem):
         self.problem = problem
-        self._known: dict[int, tuple[np.ndarray, Unfit]] = {}
+        self._known: dict[int, tuple[np.ndarray, OtherShapes]] = {}
 
-    def __call__(self, trial: Trial) -> Unfit:
+    def __call__(self, trial: Trial) -> OtherShapes:
         """What other shapes would gain where the trial has its laws.
 
         Nothing is known, and nothing gained, where the motion is imposed or runs away.
@@ -53,14 +43,14 @@ class LackOfFit:
         return self._known[id(trial.theta)][1].nats if id(trial.theta) in self._known else None
 
 
-def _unfit(trial: Trial, problem: Problem) -> Unfit:
+def _unfit(trial: Trial, problem: Problem) -> OtherShapes:
     if problem.imposed:
-        return Unfit(0.0)
+        return OtherShapes(0.0)
     posterior = problem.posterior_of(trial)
     links = list(dict.fromkeys(law.at for law in trial.laws)) or list(trial.structure.links)
     runs = [free_run(posterior, trial.theta, index) for index in range(len(posterior.records))]
     if any(map(runs_away, runs, posterior.records)):
-        return Unfit(0.0, strays=np.inf)
+        return OtherShapes(0.0, strays=np.inf)
     shapes = _shapes(trial, posterior, links, runs)
     parts = [moved(trial, posterior, index, shape) for index, shape in enumerate(shapes)]
     error, by_unknown, by_shape = (np.concatenate(part) for part in zip(*parts, strict=True))
@@ -68,7 +58,9 @@ def _unfit(trial: Trial, problem: Problem) -> Unfit:
     (left, told), (less, more) = _left(by_unknown, error), _left(np.hstack([by_unknown, by_shape]), error)
     nats = (left - less) / 2 - (more - told) / 2  # half of chi-square, less half of its mean
     # Errors of coarse digits are a curve of the motion as well, if a small one.
-    return Unfit(0.0 if digits else nats, (left - less) / max(left, np.finfo(float).tiny), _strays(posterior, runs))
+    return OtherShapes(
+        0.0 if digits else nats, (left - less) / max(left, np.finfo(float).tiny), _strays(posterior, runs)
+    )
 
 
 def _strays(posterior: Posterior, runs: Sequence[np.ndarray]) -> float:

@@ -9,11 +9,10 @@ import numpy as np
 from ..identification import Nuisances
 from ..records import Record, advanced
 from ..structures import ChannelDelay, ForceDelay, Structure
-from ._adequacy import SIGNIFICANT
 from ._holdout import HeldOut
 from ._problem import Problem
-from ._standing import UNPREDICTED
 from ._trial import Trial
+from .thresholds import THRESHOLDS
 
 _DELAYS = (ForceDelay, ChannelDelay)
 Late = Mapping[tuple[str, int], float]
@@ -35,7 +34,7 @@ def slightly_late(trials: Sequence[Trial], known: Late, dt: float) -> Late:
     more = {part.at: known.get(part.at, 0.0) + float(part.tau) for part in delays}
     rest = tuple(effect for effect in best.effects if not issubclass(effect.cause.effect, _DELAYS))
     without = max((t.evidence for t in trials if t.effects == rest), default=-math.inf)
-    return {**known, **more} if delays and slight and best.evidence > without + SIGNIFICANT else known
+    return {**known, **more} if delays and slight and best.evidence > without + THRESHOLDS.significant else known
 
 
 def seems_late(beside: Trial, problem: Problem) -> ChannelDelay | None:
@@ -52,7 +51,7 @@ def seems_late(beside: Trial, problem: Problem) -> ChannelDelay | None:
         if curvature > 0 and abs(slope) * _STEP < curvature:
             found[channel] = slope**2 / (2 * curvature), -slope / curvature * _STEP
     most = max(found, key=lambda channel: found[channel], default=None)
-    if most is None or found[most][0] < UNPREDICTED:
+    if most is None or found[most][0] < THRESHOLDS.searched:
         return None
     return ChannelDelay(found[most][1] * problem.first.record.dt, at=most)
 

@@ -23,13 +23,13 @@ from ..dynamics._law_along import force_at
 from ..identification import LADDER, Nuisances, approach, finish, lanes_of, prepare
 from ..records import Record
 from ..structures import AbstractTerm, Structure
-from ._adequacy import SIGNIFICANT
 from ._begin import found_in, own_part
 from ._candidates import at_rest
 from ._chance import noise_levels
 from ._gain import remeasured
 from ._problem import Problem
 from ._trial import Trial
+from .thresholds import THRESHOLDS
 
 RIVAL = 0.02
 """Probability from which another explanation is a rival."""
@@ -77,7 +77,7 @@ class Proposal:
     @property
     def tells(self) -> bool:
         """Whether the test is worth doing."""
-        return self.nats > SIGNIFICANT
+        return self.nats > THRESHOLDS.significant
 
 
 @dataclass(frozen=True)
@@ -184,7 +184,7 @@ def _tried(leading: Leading, test: Variation, words: str, key: jax.Array) -> lis
         return []
     least = min(each)
     # One nat more for either, which is chance. A truth that loses by far did not find back to its numbers.
-    nats = math.sqrt(float(np.prod(np.maximum(each, 0.0) + 1.0))) - 1.0 if least > -SIGNIFICANT else least
+    nats = math.sqrt(float(np.prod(np.maximum(each, 0.0) + 1.0))) - 1.0 if least > -THRESHOLDS.significant else least
     names = leading.rivals[0].name, leading.rivals[1].name
     return [Proposal(words, nats, least, _reach(leading, one[0]), names, one[0])]
 

@@ -19,10 +19,10 @@ from ._akin import other_delay
 from ._begin import Begin, found_in
 from ._candidates import SHAPES, Candidate, Laws, natural_starts
 from ._effect import Effect
-from ._enough import far_off
 from ._problem import Problem
 from ._score import promised
 from ._trial import Trial
+from .evidence.own_values import at_bounds
 
 _BASES = 5
 """Causes beside which a second one is looked for, at most: the best of each family."""
@@ -58,7 +58,7 @@ def pairs(
     found: list[_Pair] = []
     families: list[str] = []
     surely = () if known is None else known.effects
-    for base in sorted(singles, key=lambda t: (t.effects != surely, bool(far_off(t)), -t.evidence)):
+    for base in sorted(singles, key=lambda t: (t.effects != surely, bool(at_bounds(t)), -t.evidence)):
         family = base.effects[0].cause.family
         if family in families or len(families) == _BASES:
             continue

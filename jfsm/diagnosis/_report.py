@@ -11,17 +11,15 @@ import numpy as np
 from ..identification import Nuisances
 from ..records import Record
 from ..structures import PARAMETER_CAUSES, AbstractTerm, Cause, Clipping, Structure, causes, is_offset
-from ._adequacy import NEGLIGIBLE
 from ._between import Difference, differences
 from ._candidates import Candidate
 from ._class import WIDER, class_of
 from ._clipped import finding
 from ._coloured import memories
 from ._course import course
-from ._decide import Decision
 from ._detectable import Smallest
 from ._diagnosis import CandidateResult, Diagnosis, Estimate, Finding, Rival
-from ._effect import Effect, names, places
+from ._effect import Effect, key_of, names, places
 from ._gain import Gain, how_run
 from ._next import RIVAL, Leading
 from ._problem import Problem
@@ -32,6 +30,10 @@ from ._steady import unsteady
 from ._trial import Trial
 from ._unfinished import Unfinished
 from ._wandering import zeros
+from .evidence.evidence import Evidence
+from .evidence.scorecard import GIVEN
+from .thresholds import THRESHOLDS
+from .verdict.decision import MODEL, Decision
 
 _SHOWN = 2000
 """Points of a curve in the report."""
@@ -51,6 +53,15 @@ class Tested(NamedTuple):
     seen: list[Smallest]
     unfit: Callable[[Trial], float | None]
     unfinished: Unfinished
+
+
+class Reached(NamedTuple):
+    """What was decided, the trial that it rests on, the law that was named, if one was, and all the evidence."""
+
+    decision: Decision
+    winner: Trial
+    term: AbstractTerm | None
+    evidence: Evidence
 
 
 @dataclass(frozen=True)
@@ -78,7 +89,7 @@ class Drawn:
 
 
 def assemble(
-    decision: Decision,
+    reached: Reached,
     clipped: list[Clipping],
     refitted: Trial,
     tested: Tested,
@@ -90,9 +101,10 @@ def assemble(
     leading: Leading | None,
 ) -> Diagnosis:
     """The diagnosis, with everything that the report needs."""
+    decision = reached.decision
     trials, model, records = tested.trials, problem.model, problem.records
     units = records[0].record.units
-    findings = _findings(decision, trials, model, records[0])
+    findings = _findings(reached, trials, model, records[0])
     if decision.verdict == "cause":
         findings += tuple(finding(sensor, units[sensor.at[0]]) for sensor in clipped)
     candidates = (
@@ -100,10 +112,10 @@ def assemble(
             _candidate(t, decision, refitted, tested.unfit(t), model, units)
             for t in sorted(trials, key=lambda t: -t.evidence)
         ),
-        *(_left_behind(b) for b in sorted(tested.behind, key=lambda b: b.nats)),
-        *(_passed_over(c, decision.cut) for c in sorted(tested.left_out, key=lambda c: -(c.share or 0.0))),
+        *(_left_behind(b, decision) for b in sorted(tested.behind, key=lambda b: b.nats)),
+        *(_passed_over(c, decision) for c in sorted(tested.left_out, key=lambda c: -(c.share or 0.0))),
     )
-    winner = decision.winner if decision.winner.label != "given" else refitted
+    winner = reached.winner if decision.winner != GIVEN else refitted
     refit = {
         p: _estimate(winner, p, model, units) for p in model.entries() if any(u.path == p for u in winner.unknowns)
     }
@@ -123,8 +135,8 @@ def assemble(
     smallest = _detectable(tested.seen, units)
     shape = shape_of(missing) if decision.verdict in ("undecided", "unnamed") else None
     record, period, shaped = records[0].record, records[0].period, decision.verdict != "consistent"
-    drawn = Drawn(missing, runs, decision.named_term, record, period, with_shape=shaped)
-    sentence, advice = _words(decision, findings, gain, shape, differ, imposed=records[0].path is not None)
+    drawn = Drawn(missing, runs, reached.term, record, period, with_shape=shaped)
+    sentence, advice = _words(reached, findings, gain, shape, differ, imposed=records[0].path is not None)
     told = {
         "jfsm": _version(),
         "verdict": decision.verdict,
@@ -142,12 +154,14 @@ def assemble(
         "gain": None if gain is None else _gain(gain),
         "notes": list(notes),
         "detectable": {c: s.plain for c, s in smallest.items()},
+        "decision": decision.plain,
+        "evidence": reached.evidence.plain,
     }
     return Diagnosis(
         verdict=decision.verdict, findings=findings, candidates=candidates, extended=extended, refitted=refit,
         gain=gain, detectable={c: s.size for c, s in smallest.items()}, noise=noise, notes=notes,
         sentence=sentence, advice=advice, told=told, drawn=drawn, leading=leading,
-        finished=not tested.unfinished.notes, untried=tested.unfinished.untried,
+        decision=decision, finished=not tested.unfinished.notes, untried=tested.unfinished.untried,
     )  # fmt: skip
 
 
@@ -224,19 +238,19 @@ def _all_values(t: Trial, model: Structure, units) -> dict[str, Estimate]:
     return {f"{cause}.{name}": estimate for cause, values in named for name, estimate in values.items()}
 
 
-def _findings(decision: Decision, trials: list[Trial], model: Structure, nuisances: Nuisances) -> tuple[Finding, ...]:
-    winner, units = decision.winner, nuisances.record.units
+def _findings(reached: Reached, trials: list[Trial], model: Structure, nuisances: Nuisances) -> tuple[Finding, ...]:
+    decision, winner, units = reached.decision, reached.winner, nuisances.record.units
     if decision.verdict == "cause" and winner.effects:
-        found = [_finding(which, decision, trials, model, nuisances) for which in range(len(winner.effects))]
+        found = [_finding(which, reached, trials, model, nuisances) for which in range(len(winner.effects))]
         return tuple(sorted(found, key=lambda f: -f.probability))
     if decision.verdict == "parameters":
-        return _wrong_values(winner, decision.share(winner), model, units)
+        return _wrong_values(winner, decision.probability(winner.key), model, units)
     return ()
 
 
-def _finding(which: int, decision: Decision, trials: list[Trial], model: Structure, nuisances: Nuisances) -> Finding:
+def _finding(which: int, reached: Reached, trials: list[Trial], model: Structure, nuisances: Nuisances) -> Finding:
     """One effect of the winner; its rivals are what it may be instead, the winner's other effects aside."""
-    winner = decision.winner
+    winner = reached.winner
     effect = winner.effects[which]
     peak = nuisances.crest * nuisances.length
 
@@ -245,15 +259,16 @@ def _finding(which: int, decision: Decision, trials: list[Trial], model: Structu
 
     kind, probability, alike, akin, instead = kind_of(winner, which), 0.0, 0.0, 0.0, dict[Effect, float]()
     for t in trials:
+        share = reached.decision.probability(t.key)
         rest = set(t.effects) - set(winner.effects)
         if effect in t.effects:
-            probability += decision.share(t)
+            probability += share
         elif len(rest) == 1:
             rival = rest.pop()
-            instead[rival] = instead.get(rival, 0.0) + decision.share(t)
-            if decision.share(t) > 0 and rival.at == effect.at:
-                alike += decision.share(t) if kind_of(t, t.effects.index(rival)) == kind else 0.0
-                akin += decision.share(t) if rival.cause.family == effect.cause.family else 0.0
+            instead[rival] = instead.get(rival, 0.0) + share
+            if share > 0 and rival.at == effect.at:
+                alike += share if kind_of(t, t.effects.index(rival)) == kind else 0.0
+                akin += share if rival.cause.family == effect.cause.family else 0.0
     ranked = sorted(instead.items(), key=lambda item: -item[1])
     rivals = tuple(Rival(r.cause.id, r.at, share) for r, share in ranked if share > RIVAL)
     cause, values = effect.cause, _values(winner, which, model, nuisances.record.units)
@@ -301,32 +316,26 @@ def _candidate(
 ) -> CandidateResult:
     error = np.sqrt(t.prediction.error)
     names = ["training", "holdout"] if error.size == 2 else [f"set {i + 1}" for i in range(error.size)]
-    why = decision.why.get(id(t), "") or ("named" if t is decision.winner else "")
+    why = decision.reasons.get(t.key, "") or ("named" if t.key == decision.winner else "")
     return CandidateResult(
         t.name, t.at, t.evidence - refitted.evidence, {n: float(e) for n, e in zip(names, error, strict=True)},
-        decision.kappa.get(id(t), 0.0), decision.share(t), _all_values(t, model, units), why,
-        t.prediction.left, t.whiteness, unfit,
+        decision.explained.get(t.key, 0.0), decision.probability(t.key), _all_values(t, model, units), why,
+        t.prediction.left(), t.whiteness, unfit,
     )  # fmt: skip
 
 
-def _left_behind(b: LeftBehind) -> CandidateResult:
-    if math.isinf(b.nats):
-        why = "not tried: the time was over"
-    else:
-        met = "not at its top when the time was over" if b.cut else "not pursued"
-        why = f"{met}: {b.nats:.3g} nats behind the best where a misfit is still forgiven"
+def _left_behind(b: LeftBehind, decision: Decision) -> CandidateResult:
+    why = decision.reasons[key_of(b.effects)]
     return CandidateResult(names(b.effects), places(b.effects), -math.inf, {}, 0.0, 0.0, {}, why)
 
 
-def _passed_over(c: Candidate, cut: bool) -> CandidateResult:
-    share = c.share or 0.0
-    rest = "the time was over" if cut else "other laws more"
-    why = f"not fitted: explains {share:.0%} of the missing force, and {rest}"
-    return CandidateResult(names(c.effects), places(c.effects), -math.inf, {}, share, 0.0, {}, why)
+def _passed_over(c: Candidate, decision: Decision) -> CandidateResult:
+    why = decision.reasons[key_of(c.effects)]
+    return CandidateResult(names(c.effects), places(c.effects), -math.inf, {}, c.share or 0.0, 0.0, {}, why)
 
 
 def _words(
-    decision: Decision,
+    reached: Reached,
     findings: tuple[Finding, ...],
     gain: Gain | None,
     shape: Shape | None,
@@ -334,6 +343,7 @@ def _words(
     *,
     imposed: bool,
 ) -> tuple[str, str]:
+    decision, winner = reached.decision, reached.winner
     error = "error of the predicted force" if imposed else "free-run error"
     share = (
         ""
@@ -348,13 +358,13 @@ def _words(
         use = "Use the refitted values." if pays else _NO_GAIN
         return " ".join([f"The form of the model is right, its values are off: {what}.", *differ]) + share, use
     if decision.verdict == "cause":
-        known = dict(causes()) | {e.cause.id: e.cause for e in decision.winner.effects}
-        said = " ".join(_said(f, known) for f in findings) + _remainder(decision.winner)
-        if decision.near is decision.winner:
+        known = dict(causes()) | {e.cause.id: e.cause for e in winner.effects}
+        said = " ".join(_said(f, known) for f in findings) + _remainder(winner)
+        if decision.near == decision.winner:
             said += " Its shape is not quite that of any law that was tried."
-        if decision.cut:
+        if not decision.finished:
             said += " The search was not finished: what was not tried may explain it as well."
-        use = _GO_ON if decision.cut else "Use the extended model." if pays else _NO_GAIN
+        use = _GO_ON if not decision.finished else "Use the extended model." if pays else _NO_GAIN
         return " ".join([said, *differ]) + share, use
     if decision.verdict == "unnamed":
         looks = "" if shape is None else f" {shape.words}"
@@ -362,13 +372,22 @@ def _words(
             f"A real effect is there that no catalogue entry explains; a map stands in.{looks}{share}",
             "Look at the map's shape; record a second run with another amplitude.",
         )
-    if decision.cut:
+    if not decision.finished:
         return "The search was ended before it was finished, and nothing that was tried until then is found.", _GO_ON
     more = "measure the velocity beside the displacement" if imposed else "measure the missing channels"
     return (
-        "Something is wrong beyond noise, and this record cannot tell what.",
+        f"Something is wrong beyond noise, and this record cannot tell what.{_stopped(decision)}",
         f"Record a second run with another amplitude, or {more}.",
     )
+
+
+def _stopped(decision: Decision) -> str:
+    """What stopped the verdict, as a sentence."""
+    row = decision.stopped_by
+    if row is None:
+        return ""
+    card = "the model" if row.of == MODEL else row.of.replace("+", " + ")
+    return f" Stopped by the check `{row.name}` of {card}: {row.says}."
 
 
 def _in_each(difference: Difference, unit: str) -> str:
@@ -380,8 +399,8 @@ def _in_each(difference: Difference, unit: str) -> str:
 
 def _remainder(winner: Trial) -> str:
     """That what was named does not explain everything, where so."""
-    left = winner.prediction.left
-    if left < NEGLIGIBLE:
+    left = winner.prediction.left()
+    if left < THRESHOLDS.negligible:
         return ""
     return f" Something is left beyond {'them' if len(winner.effects) > 1 else 'it'}: {left:.1%} of the signal."
 

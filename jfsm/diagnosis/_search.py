@@ -12,15 +12,17 @@ import numpy as np
 from .._threads import compiled_once, side_by_side
 from ..identification import LADDER, LANES, Maximum, Posterior, approach, finish, lanes_of, rungs, with_offsets
 from ..structures import AbstractSensor, AbstractTerm, AccelerationGain, ForceGain, Structure
-from ._adequacy import GATE, SIGNIFICANT, adequate, explained
 from ._akin import beside_a_spring, instead_of, late_instead, resting, special_cases
 from ._begin import Begin, found_in, own_part
 from ._candidates import Candidate
 from ._effect import Effect, families
-from ._enough import far_off, is_itself
+from ._enough import is_itself
 from ._pairs import crossed, instead, joined, pairs
 from ._problem import Problem
 from ._trial import Trial, trial
+from .evidence.excess import explained, is_noise_only
+from .evidence.own_values import at_bounds
+from .thresholds import THRESHOLDS
 
 FAR_BEHIND = 200.0
 """Nats behind the leader, one per cent of unmodelled force forgiven, from which a candidate is not pursued,"""
@@ -252,7 +254,7 @@ def search_akin(
     if problem.limit.over:
         return known
     evidence, wider = {t.effects: t.evidence for t in known.trials}, list[Candidate]()
-    ranked = sorted(close if any(map(adequate, close)) else known.trials, key=lambda t: -t.evidence)
+    ranked = sorted(close if any(map(is_noise_only, close)) else known.trials, key=lambda t: -t.evidence)
     for t in ranked:
         done = {c.effects for c in wider}
         behind = [c for c in every if c.effects not in done and evidence.get(c.effects, -math.inf) < t.evidence]
@@ -275,7 +277,7 @@ def search_again(told: Sequence[Trial], refitted: Trial, problem: Problem, tell:
     """
     ways = (lambda t: -t.evidence, lambda t: float(np.sum(t.prediction.error)))
     leader = max(told, key=lambda t: t.evidence, default=None)
-    if leader is not None and adequate(leader):
+    if leader is not None and is_noise_only(leader):
         told = [t for t in told if leader.evidence - t.evidence < _CLOSE]
     alike = [[t for t in told if (len(t.effects) > 1) is many] for many in (False, True)]
     best = {t.effects: t for these in alike for way in ways for t in sorted(these, key=way)[:_AGAIN]}
@@ -332,19 +334,23 @@ def search_pairs(
         return _climbed(lots, way, [lot for lot in lots if lot.families == kept], best, tell)
 
     def leading(found: Found) -> Trial:
-        possible = [t for t in found.trials if is_itself(t) and far_off(t) <= far_off(refitted)]
+        possible = [t for t in found.trials if is_itself(t) and at_bounds(t) <= at_bounds(refitted)]
         return max(possible, key=lambda t: t.evidence, default=best)
 
     found, before = climbed(pairs(singles, known, effects, problem), _TOGETHER), best
     for _ in range(_ROUNDS):
         leader = leading(found)
         gained = leader.evidence - before.evidence
-        if problem.limit.over or gained < SIGNIFICANT and (before is not best or explained(leader, best) < GATE):
+        if (
+            problem.limit.over
+            or gained < THRESHOLDS.significant
+            and (before is not best or explained(leader, best) < THRESHOLDS.half)
+        ):
             break
         # From the leader's numbers some may arrive that stopped on their way from elsewhere. Those of its own families
         # are seen off at their tops only: laws alike tell apart late. Once it leaves noise only, others are no use.
         kin, done = families(leader.effects), {t.effects for t in found.trials}
-        others = before is best or not adequate(leader)
+        others = before is best or not is_noise_only(leader)
         near = instead(leader, effects, problem)
         near = [c for c in near if families(c.effects) == kin or (others and c.effects not in done)]
         found, before = found.and_then(climbed(near, _INSTEAD, kept=kin)), leader

@@ -11,7 +11,6 @@ from ..dynamics import Reconstruction
 from ..identification import prepare_all
 from ..records import Record
 from ..structures import Cause, ChannelDelay, Structure
-from ._adequacy import GATE, MUCH, NEGLIGIBLE, explained, white
 from ._between import differ
 from ._candidates import Apart, Candidate, as_promising, candidates, contained, elsewhere, promising
 from ._chance import beside_chance, noise_beyond
@@ -40,6 +39,8 @@ from ._steps import Steps
 from ._trial import Trial
 from ._untold import in_step
 from ._wandering import PLAINLY, SLOWLY, steadied, wandering
+from .evidence.excess import explained, white
+from .thresholds import THRESHOLDS
 
 _AS_LIKELY = 3.0
 """Nats by which trials are apart, at most, of which none is likelier than the other."""
@@ -96,7 +97,7 @@ class Study:
         parts = pieces(training, [n.period for n in problem.records])
         if parts is None:
             problem, given, refitted = _believed(problem)
-            if unless_later and not self.limit.over and _later(refitted, NEGLIGIBLE):
+            if unless_later and not self.limit.over and _later(refitted, THRESHOLDS.negligible):
                 return refitted
             problem, every, found = self._sought(problem, given, refitted, known)
         else:
@@ -107,7 +108,7 @@ class Study:
                 found = self._fitted_again(ahead, given, refitted, problem)
             if self.limit.over:
                 return part, every, ahead
-            if unless_later and _later(found.refitted, NEGLIGIBLE):
+            if unless_later and _later(found.refitted, THRESHOLDS.negligible):
                 return found.refitted
         if unless_later and not self.limit.over and shows_later(found.every):
             return max((t for t in found.every if len(t.effects) < 2), key=lambda t: t.evidence)
@@ -200,7 +201,7 @@ class Study:
 
         def close(trials: Sequence[Trial]) -> list[Trial]:
             best = max(told([given, refitted, *trials]), key=lambda t: t.evidence)
-            return [t for t in trials if t is best or explained(t, refitted) >= GATE]
+            return [t for t in trials if t is best or explained(t, refitted) >= THRESHOLDS.half]
 
         tried, left_out = promising(every)
         steps = problem.first.steps_for([self.model])
@@ -311,13 +312,13 @@ def _not_far_behind(
 def shows_later(trials: Sequence[Trial]) -> bool:
     """Whether what is lacking shows in what was kept back, beside the best trial and beside all that are as likely."""
     best = max(t.evidence for t in trials)
-    return all(_later(t, MUCH) for t in trials if t.evidence > best - _AS_LIKELY)
+    return all(_later(t, THRESHOLDS.much) for t in trials if t.evidence > best - _AS_LIKELY)
 
 
 def _later(trial: Trial, much: float) -> bool:
     """Whether a trial leaves nothing of what was fitted, but `much` of what was kept back, as a share of the signal."""
-    fitted, kept_back = (np.sqrt(trial.prediction.beyond[first::2]) for first in (0, 1))
-    return white(trial) and bool(np.all(fitted < NEGLIGIBLE) and np.any(kept_back > much))
+    fitted, kept_back = (np.sqrt(trial.prediction.beyond()[first::2]) for first in (0, 1))
+    return white(trial) and bool(np.all(fitted < THRESHOLDS.negligible) and np.any(kept_back > much))
 
 
 def _beside(

@@ -8,7 +8,8 @@ import numpy as np
 
 from ..identification import Hypothesis, Maximum, Nuisances, Posterior, Unknown, interval, without_small_offsets
 from ..structures import AbstractSensor, AbstractTerm, Structure, is_offset
-from ._effect import Effect, names, places
+from ._effect import Effect, key_of, names, places
+from .evidence.prediction import Prediction
 
 FILTERED, PREDICTED = 2.0, 3.0
 """Periods of filtering before, and of free prediction in, every window."""
@@ -19,52 +20,12 @@ _RUN_AWAY = 1e6
 _SLIGHT = 3.0
 """Offset of a force or an acceleration, in widths of what is believed of it, up to which it is no more than a nuisance.
 """
-_CHANCE = 2.0
-"""Standard deviations by which noise may leave more than it does in the mean."""
 SLACKS = (0.0, 0.01, 0.05)
 """How loosely the state may be held while it is filtered; each hypothesis is judged by its best."""
-_LOST = 0.05
-"""Share of a baseline's error that noise may leave of a prediction, whatever its filter says."""
 _ENOUGH = 1600
 """Samples from which a lag-one correlation is told as it is: chance then leaves a fortieth."""
 _OF_DIGITS = 0.3
 """Share of the correlation of a coarse channel's innovations that counts: its digits' errors repeat with the motion."""
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """Free prediction over some periods, in units of each channel's spread, squared and summed over channels.
-
-    `error` is what was seen, `expected` what noise alone would leave, `scatter` the standard deviation of that; all per
-    set (training, held out, ...).
-    """
-
-    error: np.ndarray
-    expected: np.ndarray
-    scatter: np.ndarray
-
-    @property
-    def excess(self) -> np.ndarray:
-        """Power beyond noise, per set."""
-        return np.maximum(self.error - self.expected, 0.0)
-
-    @property
-    def beyond(self) -> np.ndarray:
-        """Power beyond noise and chance, per set."""
-        return np.maximum(self.error - self.expected - _CHANCE * self.scatter, 0.0)
-
-    @property
-    def left(self) -> float:
-        """What is left beyond noise and chance, as a share of the signal; of the worst set."""
-        return math.sqrt(float(np.max(self.beyond)))
-
-    def beside(self, baseline: "Prediction") -> "Prediction":
-        """The same, with no more left to noise than twice what it leaves of a baseline, or a share of that one's error.
-
-        A filter that says it does not know where the motion is, as where a law's slope has no bounds, predicts nothing.
-        """
-        most = np.maximum(2 * baseline.expected, _LOST * baseline.error)
-        return Prediction(self.error, np.minimum(self.expected, most), np.minimum(self.scatter, most))
 
 
 @dataclass(frozen=True)
@@ -95,6 +56,16 @@ class Trial:
     def name(self) -> str:
         """Cause ids, or what the hypothesis is."""
         return names(self.effects) or self.label
+
+    @property
+    def key(self) -> str:
+        """Its effects with their places, or what the hypothesis is."""
+        return key_of(self.effects) or self.label
+
+    @property
+    def noise_scale(self) -> float:
+        """Largest departure of a channel's fitted noise from its floor, as a logarithm, where that is known."""
+        return float(np.max(np.abs(self.noise[self.trusted]), initial=0.0))
 
     @property
     def at(self) -> tuple:
@@ -148,11 +119,11 @@ class Trial:
 
     def beside(self, baseline: "Trial") -> "Trial":
         """The same, its prediction judged beside that of a baseline."""
-        return replace(self, prediction=self.prediction.beside(baseline.prediction))
+        return replace(self, prediction=self.prediction.bounded_by(baseline.prediction))
 
     def amid(self, noise: np.ndarray) -> "Trial":
         """The same, its prediction judged amid so much more noise per set."""
-        return replace(self, prediction=replace(self.prediction, expected=self.prediction.expected + noise))
+        return replace(self, prediction=self.prediction.with_noise(noise))
 
     def interval(self, path: str, record: int | None = None) -> tuple[float, float, float]:
         """Value and 95 % interval of an unknown; symmetric in its own coordinate. Of one that each record has to

@@ -4,8 +4,8 @@ import numpy as np
 
 from ..identification import Nuisances, Posterior
 from ._problem import Problem
-from ._standing import UNPREDICTED
 from ._trial import Trial, standardised
+from .thresholds import THRESHOLDS
 
 _DEGREE = 5
 """Of the polynomials of time that stand for what is slow."""
@@ -32,7 +32,7 @@ def wandering(beside: Trial, problem: Problem, least: float) -> int | None:
         return None
     wandered = problem.with_wandering(channel).posterior_of(beside)
     before, after = (float(one.values(beside.theta[None])[0]) for one in (posterior, wandered))
-    return channel if before - after > UNPREDICTED else None
+    return channel if before - after > THRESHOLDS.searched else None
 
 
 def _slow(posterior: Posterior, beside: Trial, index: int) -> np.ndarray:

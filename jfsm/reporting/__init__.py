@@ -8,6 +8,7 @@ from ._force_map_page import render_force_map as render_force_map
 from ._inspection_page import render_inspection as render_inspection
 from ._inspection_pictures import inspection_pictures as inspection_pictures
 from ._page import render_page as render_page
+from ._page_again import read_diagnosis as read_diagnosis
 from ._page_again import render_json as render_json
 from ._pictures import pictures as pictures
 from ._pictures import plot_diagnosis as plot_diagnosis
@@ -19,3 +20,5 @@ from ._text import diagnosis_text as diagnosis_text
 from ._text import inspection_text as inspection_text
 from ._text import print_diagnosis as print_diagnosis
 from ._text import print_inspection as print_inspection
+from ._why import print_why as print_why
+from ._why import why_text as why_text

@@ -16,6 +16,7 @@ from jfsm.reporting._tables import (
     rivals_table,
 )
 from jfsm.reporting._template import inline, template
+from jfsm.reporting._why import checks_table, decisive_checks, probability_line, stopping_line
 from jfsm.reporting._wording import checked_verdict, extent
 
 FIRST_CANDIDATES = 10
@@ -44,7 +45,7 @@ def render_page(d: Mapping[str, Any]) -> str:
         If `d` is not the dictionary of a diagnosis.
     """
     findings, candidates = d.get("findings") or (), d.get("candidates") or ()
-    record = d.get("record") or {}
+    record, decision = d.get("record") or {}, d.get("decision") or {}
     verdict = checked_verdict(d)
     headline, _, remark = (d.get("sentence") or verdict.meaning).partition(". ")
     return template("diagnosis.html.j2").render(
@@ -64,6 +65,9 @@ def render_page(d: Mapping[str, Any]) -> str:
         gain=gain_table((d.get("gain") or {}).get("channels") or {}),
         first_candidates=candidates_table(candidates[:FIRST_CANDIDATES]),
         more_candidates=candidates_table(candidates[FIRST_CANDIDATES:]),
+        why=[*filter(None, (stopping_line(d), probability_line(d, decision.get("winner", ""))))],
+        decisive=checks_table(decisive_checks(d), "Decisive checks", whose=True),
+        every_check=checks_table(decision.get("checks") or (), "Every check, in order", whose=True),
         refitted=refitted_table(d.get("refitted") or {}),
         channels=channels_table(record.get("channels") or ()),
         detectable=detectable_table(d.get("detectable") or {}),

@@ -1,10 +1,14 @@
 """A page made again from the file of its numbers."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, TypeVar
 
 from jfsm.reporting._inspection_page import render_inspection
 from jfsm.reporting._page import render_page
+
+T = TypeVar("T")
 
 
 def render_json(path: str | Path) -> str:
@@ -17,12 +21,35 @@ def render_json(path: str | Path) -> str:
     ValueError
         If it holds neither, or is cut short.
     """
+    return _shown(path, lambda d: render_page(d) if "verdict" in d else render_inspection(d))
+
+
+def read_diagnosis(path: str | Path) -> dict[str, Any]:
+    """What ``Diagnosis.to_json`` wrote.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    ValueError
+        If it does not hold the numbers of a diagnosis with its checks, or is cut short.
+    """
+
+    def checked(d: dict[str, Any]) -> dict[str, Any]:
+        if not d["decision"]["checks"]:
+            raise ValueError("it has no checks")
+        return d
+
+    return _shown(path, checked)
+
+
+def _shown(path: str | Path, show: Callable[[dict[str, Any]], T]) -> T:
     target = Path(path)
     try:
         d = json.loads(target.read_text(encoding="utf-8"))
         if not isinstance(d, dict) or not ("verdict" in d or "comparisons" in d):
             raise ValueError("it has no verdict")
-        return render_page(d) if "verdict" in d else render_inspection(d)
+        return show(d)
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise ValueError(
             f"{target} must be what `jfsm diagnose --json {target.name}` writes; it cannot be shown as such "

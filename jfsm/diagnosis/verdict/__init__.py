@@ -1,0 +1,1 @@
+"""What follows from the evidence: a pure function of scorecards and thresholds."""

@@ -1,0 +1,327 @@
+"""Every check that a verdict rests on: its stage, what it asks, and the thresholds that limit it."""
+
+from collections.abc import Mapping
+from typing import Literal, NamedTuple
+
+Stage = Literal["searched", "sensors", "detected", "admissible", "named", "sufficient", "confirmed"]
+Relation = Literal[">=", "<=", ">", "<"]
+
+STAGES: Mapping[Stage, str] = {
+    "searched": "Was everything looked into?",
+    "sensors": "Do the sensors show what happened?",
+    "detected": "Is anything wrong with the model beyond noise?",
+    "admissible": "Is this candidate an alternative to what is known without it?",
+    "named": "Is its name sure enough?",
+    "sufficient": "Is what it leaves only noise, and its shape right?",
+    "confirmed": "Do runs over held-out readings agree?",
+}
+
+
+class Check(NamedTuple):
+    """One comparison: what was measured of which hypothesis, the limit, and the outcome."""
+
+    stage: Stage
+    name: str
+    of: str
+    measured: float
+    relation: Relation
+    threshold: float
+    unit: str
+    passed: bool
+    says: str
+
+
+class Kind(NamedTuple):
+    """What is the same wherever a check is made; `limits` are the names of thresholds."""
+
+    stage: Stage
+    relation: Relation
+    unit: str
+    asks: str
+    limits: tuple[str, ...] = ()
+
+
+CHECKS: Mapping[str, Kind] = {
+    "finished": Kind(
+        "searched",
+        ">=",
+        "searches that were finished",
+        "The search went on to its end; else a cause is half as sure, and without one nothing is decided.",
+    ),
+    "no_clipping": Kind(
+        "sensors",
+        "<=",
+        "limits",
+        "No channel is cut off at a limit of its recorder.",
+    ),
+    "better_than_given": Kind(
+        "detected",
+        ">=",
+        "nats",
+        "The best explanation is more probable than the model as given.",
+        ("significant",),
+    ),
+    "visible_in_prediction": Kind(
+        "detected",
+        ">=",
+        "share of the signal",
+        "Predictions of the model as given leave an error beyond noise. Where they do not, only a "
+        "hypothesis that leaves nothing but noise is a finding.",
+        ("negligible", "chance"),
+    ),
+    "refit_leaves_no_shape": Kind(
+        "detected",
+        "<=",
+        "nats",
+        "Beside a model that is called consistent, forces of any shape gain no more than noise lets them.",
+        ("other_shapes",),
+    ),
+    "stays_in_step": Kind(
+        "detected",
+        "<=",
+        "ratio",
+        "A run of a model that is called consistent over all held-out readings is as wrong as noise makes "
+        "it. If not, the verdict is reached anew, and small errors over some periods count.",
+        ("worse", "negligible"),
+    ),
+    "stays_bounded": Kind(
+        "admissible",
+        "<=",
+        "runs that escape",
+        "Its motion stays bounded.",
+    ),
+    "law_is_itself": Kind(
+        "admissible",
+        "<=",
+        "other laws that it is",
+        "With the numbers found, its law is not another one of the catalogue.",
+    ),
+    "own_values_within_bounds": Kind(
+        "admissible",
+        "<=",
+        "own values at a bound",
+        "It takes no own value to the end of what the model's owner believes, where the refitted model does not.",
+    ),
+    "better_than_refit": Kind(
+        "admissible",
+        ">",
+        "nats",
+        "It is more probable than the refitted model; by more where that one's predictions leave nothing, "
+        "since of many candidates some gain a little by chance.",
+        ("significant", "searched"),
+    ),
+    "explains_half_of_excess": Kind(
+        "admissible",
+        ">=",
+        "share of excess power",
+        "It explains half of the error power that the refitted model leaves beyond noise, on every set of samples.",
+        ("half", "noticeable", "chance"),
+    ),
+    "second_effect_pays": Kind(
+        "admissible",
+        ">",
+        "nats",
+        "Two effects are more probable than either alone and than the best single one.",
+        ("searched", "significant"),
+    ),
+    "second_effect_explains_half": Kind(
+        "admissible",
+        ">=",
+        "share of excess power",
+        "Two effects explain half of what one alone leaves.",
+        ("half",),
+    ),
+    "second_effect_predicts_better": Kind(
+        "admissible",
+        ">=",
+        "share of the refit's error",
+        "Two effects predict better than one by enough to be worth it.",
+        ("second_effect", "second_effect_to_noise"),
+    ),
+    "no_bias_beside_it": Kind(
+        "admissible",
+        "<=",
+        "nats",
+        "Beside it no offset of an accelerometer is so large that it is a bias.",
+        ("bias",),
+    ),
+    "shown_by_a_second_record": Kind(
+        "admissible",
+        ">",
+        "records that show the same",
+        "Where a model error is admitted, a change with time is shown by a second record.",
+    ),
+    "out_of_step_with_drive": Kind(
+        "admissible",
+        "<=",
+        "loads of the drive's line",
+        "It is no load of the single line that drives the structure, which takes the place of the noisy drive.",
+    ),
+    "no_simpler_law_as_good": Kind(
+        "named",
+        ">=",
+        "nats",
+        "No special case of its law, with fewer numbers, is about as probable.",
+        ("special_case",),
+    ),
+    "probability": Kind(
+        "named",
+        ">=",
+        "probability",
+        "It is more likely than everything else together.",
+        ("named", "tempering", "fewest_looks", "most_looks", "periods_per_look", "unlisted"),
+    ),
+    "probability_of_family": Kind(
+        "named",
+        ">=",
+        "probability",
+        "If it is not, the laws of its family together are likely.",
+        ("family",),
+    ),
+    "same_in_all_records": Kind(
+        "named",
+        "<=",
+        "ratio",
+        "The numbers of its law are the same in all records; else it is half as sure.",
+        ("differs",),
+    ),
+    "innovations_are_white": Kind(
+        "sufficient",
+        "<",
+        "correlation",
+        "What it leaves does not correlate from sample to sample.",
+        ("white",),
+    ),
+    "noise_is_the_floor": Kind(
+        "sufficient",
+        "<",
+        "log of a ratio",
+        "What it leaves is as large as the noise floor of the channels.",
+        ("noise_scale",),
+    ),
+    "leaves_little": Kind(
+        "sufficient",
+        "<",
+        "share of the signal",
+        "Its predictions leave nothing beyond noise.",
+        ("negligible", "chance"),
+    ),
+    "map_adds_little": Kind(
+        "sufficient",
+        "<",
+        "share of excess power",
+        "A map of the force that it leaves would not explain half of the rest.",
+        ("half",),
+    ),
+    "explains_nearly_all": Kind(
+        "sufficient",
+        ">=",
+        "share of excess power",
+        "If it leaves much of the signal, it explains nearly all of the rest: else it is only the nearest law.",
+        ("nearly_all", "much"),
+    ),
+    "values_explain_half": Kind(
+        "sufficient",
+        ">=",
+        "share of excess power",
+        "Own values that leave more than noise explain half of what the model as given leaves.",
+        ("half",),
+    ),
+    "values_leave_little": Kind(
+        "sufficient",
+        "<",
+        "share of the signal",
+        "And their predictions leave less than twice what is negligible.",
+        ("negligible",),
+    ),
+    "right_shape": Kind(
+        "sufficient",
+        "<=",
+        "nats",
+        "Forces of other shapes would gain only a small share of what it gains itself (a score test).",
+        (
+            "other_shapes",
+            "other_shapes_of_values",
+            "other_shapes_of_one",
+            "other_shapes_of_two",
+            "other_shapes_white",
+            "other_shapes_of_white",
+            "alike",
+        ),
+    ),
+    "rest_without_shape": Kind(
+        "sufficient",
+        "<=",
+        "share of the innovations' power",
+        "Forces of other shapes would not explain half of what it leaves.",
+        ("rest_with_shape",),
+    ),
+    "identifiable_here": Kind(
+        "sufficient",
+        "<=",
+        "reasons why not",
+        "These records can show it: not a change with time in a single decay, nor a load in step with a single line.",
+    ),
+    "two_laws_are_seen": Kind(
+        "sufficient",
+        ">",
+        "sets of samples that show them",
+        "Predictions of the refitted model show something, if two laws are to be named.",
+    ),
+    "not_worse": Kind(
+        "confirmed",
+        "<=",
+        "ratio",
+        "Its held-out run is no worse than that of the model as given.",
+        ("worse",),
+    ),
+    "not_harmful": Kind(
+        "confirmed",
+        ">=",
+        "share of held-out error",
+        "If it leaves more than noise, its held-out run adds no error beyond chance.",
+    ),
+    "gains_something": Kind(
+        "confirmed",
+        ">",
+        "share of held-out error",
+        "If it is not likely, or predictions do not show it, its held-out run is better beyond chance.",
+        ("named", "beyond_question"),
+    ),
+    "closes_half": Kind(
+        "confirmed",
+        ">=",
+        "share of held-out error",
+        "A map, or what only a long run shows, closes half of the held-out error.",
+        ("half",),
+    ),
+    "may_close_half": Kind(
+        "confirmed",
+        ">=",
+        "share of held-out error",
+        "If it leaves more than noise, its held-out run may close half of the error; else it is half as sure.",
+        ("half",),
+    ),
+    "closes_nearly_all": Kind(
+        "confirmed",
+        ">=",
+        "share of held-out error",
+        "A law that is not quite of the right shape closes nearly all of the held-out error; its class is named then.",
+        ("almost_all",),
+    ),
+}
+"""In the order of the stages."""
+
+_HOLDS = {
+    ">=": lambda measured, limit: measured >= limit,
+    "<=": lambda measured, limit: measured <= limit,
+    ">": lambda measured, limit: measured > limit,
+    "<": lambda measured, limit: measured < limit,
+}
+
+
+def checked(name: str, of: str, measured: float, limit: float, says: str) -> Check:
+    """The outcome of a check of `CHECKS`, of the hypothesis with the key `of`."""
+    kind = CHECKS[name]
+    passed = bool(_HOLDS[kind.relation](measured, limit))
+    return Check(kind.stage, name, of, float(measured), kind.relation, float(limit), kind.unit, passed, says)

@@ -1,0 +1,149 @@
+"""What runs over held-out readings say of a verdict."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from ..evidence import excess
+from ..evidence.evidence import Evidence, has_map
+from ..evidence.held_out import HeldOutErrors
+from ..evidence.scorecard import GIVEN, REFITTED, Scorecard
+from ..thresholds import Thresholds
+from .bench import Bench
+from .checks import Check, checked
+from .decision import MODEL, Decision
+
+_NEAR = "is of the right class, though not quite of the right shape"
+Objection = tuple[Check, str] | None
+"""A check that a verdict does not pass, and why it is refused then."""
+
+
+def falls_out_of_step(evidence: Evidence, limits: Thresholds) -> Check | None:
+    """That the model, right over some periods, is wrong in the whole run over held-out readings, refitted or not."""
+    errors = evidence.held_out(GIVEN)
+    if errors is None:
+        return None
+    times = min(errors.before, errors.refitted) / max(errors.floor, limits.negligible)
+    says = (
+        f"a run over all held-out readings is {times:.3g} times as wrong as noise makes it; {limits.worse:.3g} at most"
+    )
+    row = checked("stays_in_step", MODEL, times, limits.worse, says)
+    return None if row.passed else row
+
+
+def confirm(decision: Decision, evidence: Evidence, limits: Thresholds, *, long_run: bool) -> Decision:
+    """The verdict as held-out readings leave it."""
+    errors = evidence.held_out(GIVEN if decision.verdict == "consistent" else decision.winner)
+    if errors is None:
+        return decision
+    hearing = _Hearing(decision, evidence, Bench(evidence, limits, evidence.candidates, long_run), errors)
+    against = hearing.objection()
+    if against is not None:
+        decision = decision.refused(against[1], REFITTED, against[0])
+    elif hearing.closes_too_little():
+        decision = decision.less_sure("runs over held-out readings close less than half")
+    by_class = None if decision.near is None or decision.verdict != "undecided" else _of_its_class(decision, hearing)
+    return replace(by_class or decision, checks=(*decision.checks, *hearing.bench.log))
+
+
+def _of_its_class(decision: Decision, hearing: "_Hearing") -> Decision | None:
+    """The decision with the law that is near named, where runs over held-out readings confirm it."""
+    bench, near = hearing.bench, decision.near
+    errors = None if near is None else bench.evidence.held_out(near)
+    if near is None or errors is None:
+        return None
+    least = bench.limits.almost_all
+    says = (
+        f"closes {errors.closed:.0%} of the error on held-out readings; {least:.0%} are needed of a law not quite right"
+    )
+    row = bench.check("closes_nearly_all", near, errors.closed, least, says)
+    if not row.passed:
+        return None
+    return replace(decision, verdict="cause", winner=near, reasons={**decision.reasons, near: _NEAR}, stopped_by=None)
+
+
+class _Hearing:
+    """A verdict before runs over held-out readings."""
+
+    def __init__(self, decision: Decision, evidence: Evidence, bench: Bench, errors: HeldOutErrors):
+        self.decision, self.bench, self.errors = decision, bench, errors
+        self.winner = None if has_map(decision.winner) else evidence.cards[decision.winner]
+        self.names = decision.verdict == "cause"
+        self.leaves_something = self.names and self.winner is not None and not bench.noise_only(self.winner)
+
+    def objection(self) -> Objection:
+        """The first check that the verdict does not pass."""
+        checks: tuple[Callable[[], Objection], ...] = (
+            self._not_worse,
+            self._not_harmful,
+            self._gains_where_unsure,
+            self._gains_where_unseen,
+            self._closes_half,
+        )
+        return next((found for check in checks if (found := check()) is not None), None)
+
+    def closes_too_little(self) -> bool:
+        """Whether a cause that leaves more than noise closes less than half of the error on held-out readings.
+
+        Where it leaves only noise, it is the motion that no run follows for long.
+        """
+        if not (self.leaves_something and self.winner is not None and self.winner.effects and self.errors.closable):
+            return False
+        high, half = self.errors.interval[1], self.bench.limits.half
+        says = f"closes {high:.0%} of the error on held-out readings at most; at least {half:.0%} is needed"
+        return not self._check("may_close_half", high, half, says).passed
+
+    def _check(self, name: str, measured: float, limit: float, says: str) -> Check:
+        return self.bench.check(name, self.decision.winner, measured, limit, says)
+
+    def _not_worse(self) -> Objection:
+        if self.decision.verdict not in ("cause", "unnamed"):
+            return None
+        most, errors = self.bench.limits.worse, self.errors
+        times = errors.after / max(errors.before, errors.floor)
+        says = (
+            f"its held-out run is {times:.3g} times as wrong as that of the model as given or noise; {most:.3g} at most"
+        )
+        return self._refused(self._check("not_worse", times, most, says))
+
+    def _not_harmful(self) -> Objection:
+        if not self.leaves_something or not self.errors.closable:
+            return None
+        high = self.errors.interval[1]
+        says = f"closes {high:.0%} of the error on held-out readings at most; it must not add to it"
+        return self._refused(self._check("not_harmful", high, 0.0, says))
+
+    def _refused(self, row: Check) -> Objection:
+        return None if row.passed else (row, "runs worse on held-out readings than the model as given")
+
+    def _gains_where_unsure(self) -> Objection:
+        if not self.leaves_something or self.decision.probability(self.decision.winner) >= self.bench.limits.named:
+            return None
+        return self._gains("is not likely, leaves something, and is not confirmed by held-out readings")
+
+    def _gains_where_unseen(self) -> Objection:
+        card = self.winner
+        if not self.names or card is None or not card.laws or self.decision.explained[card.key] != 0.0:
+            return None
+        if self._is_beyond_question(card):
+            return None
+        return self._gains("explains nothing that predictions leave, and is not confirmed by held-out readings")
+
+    def _is_beyond_question(self, card: Scorecard) -> bool:
+        bench = self.bench
+        ahead = card.evidence - max(bench.given.evidence, bench.refitted.evidence)
+        return ahead > bench.limits.beyond_question and excess.is_noise_only(card, bench.limits)
+
+    def _gains(self, why: str) -> Objection:
+        low = self.errors.interval[0] if self.errors.closable else 0.0
+        says = f"closes {low:.0%} of the error on held-out readings at least; it must close some"
+        row = self._check("gains_something", low, 0.0, says)
+        return None if row.passed else (row, why)
+
+    def _closes_half(self) -> Objection:
+        """Of a map; and of anything where the model is wrong in the long run alone."""
+        if not (self.decision.verdict == "unnamed" or self.bench.long_run) or not self.errors.closable:
+            return None
+        closed, half = self.errors.closed, self.bench.limits.half
+        says = f"closes {closed:.0%} of the error on held-out readings; at least {half:.0%} is needed"
+        row = self._check("closes_half", closed, half, says)
+        return None if row.passed else (row, "closes less than half of the error on held-out readings")

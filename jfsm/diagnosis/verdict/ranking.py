@@ -1,0 +1,108 @@
+"""How probable the alternatives are, and which of them a name belongs to."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..evidence import excess
+from ..evidence.scorecard import Scorecard
+from ..thresholds import THRESHOLDS, Thresholds
+from .admissible import is_possible
+from .bench import Bench, shown
+
+
+def rank(bench: Bench) -> Scorecard:
+    """The most probable alternative; of a law and its special case that are about as probable, the latter."""
+    passing = bench.passing
+    alternatives = [bench.given, bench.refitted, *passing]
+    _share_out(alternatives, bench)
+    winner = max(alternatives, key=lambda card: bench.probability(card.key))
+    for card in passing:
+        if card is not winner:
+            bench.reasons[card.key] = "explains it too, but is less probable"
+    special = _special_case(winner, passing, bench)
+    if special is None:
+        return winner
+    bench.reasons |= {winner.key: "is hardly more probable than its special case", special.key: ""}
+    return special
+
+
+def family_of(winner: Scorecard, bench: Bench) -> list[Scorecard]:
+    """The alternatives whose effects are of the same families."""
+    return [card for card in bench.candidates if card.key in bench.factors and card.families == winner.families]
+
+
+def is_sure_of(winner: Scorecard, bench: Bench) -> bool:
+    """Whether a name, or at least its family, is probable enough to be said."""
+    _beside_likelier_laws(winner, bench)
+    family = sum(bench.probability(card.key) for card in family_of(winner, bench))
+    if not bench.noise_only(winner):
+        # The rest may be the work of another law than the catalogue's: no name is surer than what it explains.
+        bench.less_sure(list(bench.factors), "share of the excess that the leader explains", bench.explained(winner))
+    probability, limits = bench.probability(winner.key), bench.limits
+    says = f"has a probability of {probability:.0%}; {limits.named:.0%} are needed"
+    named = bench.check("probability", winner.key, probability, limits.named, says)
+    if named.passed:
+        return True
+    says = f"laws of its family have a probability of {family:.0%}; {limits.family:.0%} are needed"
+    alike = bench.check("probability_of_family", winner.key, family, limits.family, says)
+    if not alike.passed:
+        bench.stop(named)
+    return bool(alike.passed)
+
+
+def _beside_likelier_laws(winner: Scorecard, bench: Bench) -> None:
+    """Among the alternatives of a sensor's fault are laws that only want a margin to be named beside the refit.
+
+    The fault needs none, as it does what own values do that are all off by the same share.
+    """
+    if winner.laws or not winner.effects or not bench.noise_only(bench.refitted):
+        return
+
+    def wants_a_margin(card: Scorecard) -> bool:
+        single = len(card.effects) == 1 and bool(card.laws) and card.evidence > winner.evidence
+        return single and bench.noise_only(card) and is_possible(card, bench)
+
+    likelier = [card for card in bench.told if wants_a_margin(card)]
+    if likelier:
+        keys = dict.fromkeys([*bench.factors, *(card.key for card in likelier)])
+        _share_out([bench.evidence.cards[key] for key in keys], bench)
+        why = "is likelier than a sensor's fault, but not than own values that are off by enough to be named"
+        bench.reasons |= {card.key: why for card in likelier}
+
+
+def _special_case(winner: Scorecard, passing: Sequence[Scorecard], bench: Bench) -> Scorecard | None:
+    """The special case of the winner's law beside which its further numbers are not seen, if there is one."""
+    cases = [card for card in passing if card.key in winner.special_cases]
+    best = max(cases, key=lambda card: card.evidence, default=None)
+    if best is None:
+        return None
+    nats, least = winner.evidence - best.evidence, bench.limits.special_case
+    says = f"gains {shown(nats)} nats over its special case, {best.label}; at least {least:.3g} are needed"
+    seen = bench.check("no_simpler_law_as_good", winner.key, nats, least, says)
+    return None if seen.passed else best
+
+
+def _share_out(alternatives: Sequence[Scorecard], bench: Bench) -> None:
+    shares = probabilities(alternatives, bench.evidence.setting.periods, bench.limits)
+    bench.share_out({card.key: float(p) for card, p in zip(alternatives, shares, strict=True)})
+
+
+def probabilities(cards: Sequence[Scorecard], periods: float, limits: Thresholds = THRESHOLDS) -> np.ndarray:
+    """Probability of each hypothesis among them.
+
+    Where the likeliest leaves only noise its evidence is trusted, tempered; where it does not, evidence counts no more
+    than some tens of independent looks at the error of prediction.
+    """
+    evidence = np.array([card.evidence for card in cards])
+    best = cards[int(np.argmax(evidence))]
+    if excess.is_noise_only(best, limits):
+        score = evidence / limits.tempering
+    else:
+        looks = min(max(periods / limits.periods_per_look, limits.fewest_looks), limits.most_looks)
+        error = np.array([math.sqrt(float(np.mean(card.prediction.error))) for card in cards])
+        size = np.array([card.unknowns for card in cards])
+        score = -looks * np.log(error) - 0.5 * size * math.log(looks)
+    share = np.exp(score - np.max(score))
+    return (1.0 - limits.unlisted) * share / np.sum(share) + limits.unlisted / len(cards)

@@ -1,0 +1,134 @@
+"""Whether the law that would be named has the right shape, by what forces of other shapes would gain beside it."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..evidence import excess
+from ..evidence.scorecard import CONSTANT_FORCE, Scorecard
+from .bench import Bench, shown
+from .checks import Check
+from .ranking import family_of
+
+WRONG_SHAPE = "explains much of it, but is not of the right shape"
+_UNSEEN = "are two laws of which predictions show nothing, and may stand for one of another shape"
+
+
+def doubt(card: Scorecard, gained: float, bench: Bench, *, shapeless: bool = False) -> tuple[float, list[Check]]:
+    """How far other shapes speak against a hypothesis whose last effect gained so many nats: above 1, too far.
+
+    With `shapeless` the share of the innovations that they explain is not asked. Beside it the checks that were made.
+    """
+    limits, shapes = bench.limits, bench.evidence.other_shapes(card.key)
+    white = bench.white(card)
+    share = (limits.other_shapes_of_values, limits.other_shapes_of_one, limits.other_shapes_of_two)[len(card.effects)]
+    least = limits.other_shapes_white if white else limits.other_shapes
+    much = (limits.other_shapes_of_white if white else share) * gained
+    far = max(shapes.nats - least, 0.0) / max(much - least, least)
+    limit = max(much, 2 * least)
+    says = f"forces of other shapes would gain {shown(shapes.nats)} nats beside it; {shown(limit)} at most may be left"
+    checks = [bench.check("right_shape", card.key, shapes.nats, limit, says)]
+    if white or shapeless:
+        return far, checks
+    rest = limits.rest_with_shape
+    says = f"forces of other shapes would explain {shapes.share:.0%} of what it leaves; {rest:.0%} at most may be left"
+    checks.append(bench.check("rest_without_shape", card.key, shapes.share, limits.rest_with_shape, says))
+    return max(far, shapes.share / limits.rest_with_shape), checks
+
+
+class Settled(NamedTuple):
+    """The law that stands for its family, the check that it fails, if it does, and a law whose class is right."""
+
+    law: Scorecard
+    failed: Check | None
+    near: Scorecard | None = None
+
+
+def settle_shape(winner: Scorecard, bench: Bench) -> Settled:
+    """Whether the winner has the right shape, or another law of its family has where its own is wrong."""
+    found, far, checks = _of_right_shape(winner, bench)
+    family = [card.key for card in family_of(found, bench)]
+    bench.less_sure(family, "other shapes would gain beside it", 1.0 - 0.5 * min(far, 1.0))
+    against = _not_identifiable(found, bench) or _both_unseen(found, bench)
+    if against is not None:
+        bench.refuse(found.key, against.says)
+        return Settled(found, against)
+    if far <= 1.0:
+        return Settled(found, None)
+    near = _nearest(found, bench)
+    bench.reasons[found.key] = WRONG_SHAPE
+    if near is None:
+        bench.refuse(found.key, WRONG_SHAPE)
+    return Settled(found, next(check for check in checks if not check.passed), near)
+
+
+def _of_right_shape(winner: Scorecard, bench: Bench) -> tuple[Scorecard, float, list[Check]]:
+    """The winner, or another law of its family whose shape is right where its own is not, with its doubt and checks.
+
+    Predictions that all leave something hardly tell one law from another of its family.
+    """
+    far, checks = _doubt_of(winner, winner, bench)
+    if far <= 1.0 or bench.noise_only(winner):
+        return winner, far, checks
+    for card in _alike(winner, bench):
+        other, checked = _doubt_of(card, winner, bench)
+        if other <= 1.0:
+            bench.refuse(winner.key, WRONG_SHAPE)
+            bench.reasons[card.key] = ""
+            return card, other, checked
+    return winner, far, checks
+
+
+def _doubt_of(card: Scorecard, winner: Scorecard, bench: Bench) -> tuple[float, list[Check]]:
+    """How far other shapes speak against a law.
+
+    Where a model error is admitted much of the rest has a shape, and says nothing against a law that explains nearly
+    all; nor does a trace that no second effect would be named for, nor one that a whole run is to judge.
+    """
+    trace = bench.explained(card) > 1.0 - bench.limits.second_effect**2
+    shapeless = bool(bench.evidence.setting.model_error) or bench.long_run or trace
+    fewer = [c for c in (bench.given, bench.refitted, *bench.candidates) if len(c.effects) < len(winner.effects)]
+    return doubt(card, card.evidence - max(c.evidence for c in fewer), bench, shapeless=shapeless)
+
+
+def _alike(winner: Scorecard, bench: Bench) -> Sequence[Scorecard]:
+    """Other laws of the family that are not much less probable, the most probable first."""
+    least = bench.limits.alike * bench.probability(winner.key)
+    alike = [card for card in family_of(winner, bench) if card is not winner]
+    ranked = sorted(alike, key=lambda card: -bench.probability(card.key))
+    return [card for card in ranked if bench.probability(card.key) > least]
+
+
+def _nearest(winner: Scorecard, bench: Bench) -> Scorecard | None:
+    """The law of the winner's family that is right in its class though not in its shape, or None.
+
+    Predictions over some periods hardly tell such laws apart; runs over all that was fitted do.
+    """
+    if bench.white(winner) or len(winner.effects) > 1:
+        return None
+    alike = [winner, *_alike(winner, bench)]
+    kin = [card for card in alike if excess.practically_all(card, bench.refitted, bench.limits)]
+    if not kin:
+        return None
+    strays = np.array([max(bench.evidence.other_shapes(card.key).strays, 1e-9) for card in kin])
+    before = np.array([bench.probability(card.key) for card in kin])
+    weighed = before * (np.min(strays) / strays) ** bench.limits.fewest_looks
+    after = weighed * np.sum(before) / np.sum(weighed)
+    for card, factor in zip(kin, after / before, strict=True):
+        bench.less_sure([card.key], "run over all that was fitted", float(factor))
+    return kin[int(np.argmax(weighed))]
+
+
+def _not_identifiable(card: Scorecard, bench: Bench) -> Check | None:
+    says = card.not_identifiable or "these records can show it"
+    done = bench.check("identifiable_here", card.key, bool(card.not_identifiable), 0, says)
+    return None if done.passed else done
+
+
+def _both_unseen(card: Scorecard, bench: Bench) -> Check | None:
+    """Two laws that only their evidence speaks for are no finding; a constant force is no such law."""
+    laws = [law for law in card.laws if law.role != CONSTANT_FORCE]
+    if len(laws) < 2 or bench.shows(bench.refitted):
+        return None
+    return bench.check("two_laws_are_seen", card.key, 0, 0, _UNSEEN)
