@@ -5,7 +5,6 @@ from dataclasses import replace
 import jax
 import numpy as np
 import pytest
-from jfsm.diagnosis._adequacy import NEGLIGIBLE, adequate
 
 import jfsm
 from jfsm.demo import DAMPING, FRICTION, MASS, STIFFNESS, hidden_friction
@@ -14,6 +13,8 @@ from jfsm.diagnosis._gain import BASE, remeasured
 from jfsm.diagnosis._problem import Problem
 from jfsm.diagnosis._search import fit_model
 from jfsm.diagnosis._trial import Trial
+from jfsm.diagnosis.evidence.excess import is_noise_only
+from jfsm.diagnosis.thresholds import THRESHOLDS
 from jfsm.identification import prepare_all
 from jfsm.structures import Coulomb
 
@@ -40,7 +41,7 @@ def judged(record: jfsm.Record, stiffness: float) -> tuple[Trial, Trial]:
 def test_noise_that_a_filter_underestimates_is_not_something_left(record):
     # Velocity and acceleration fill their bands, so that no smooth curve tells their noise.
     first, drawn = judged(record, STIFFNESS)
-    assert first.prediction.left > 0 and not drawn.prediction.left
+    assert first.prediction.left() > 0 and not drawn.prediction.left()
     assert np.all(drawn.prediction.expected > 1.2 * first.prediction.expected)
     assert np.all(np.abs(drawn.prediction.error - drawn.prediction.expected) < 4 * drawn.prediction.scatter)
 
@@ -48,8 +49,8 @@ def test_noise_that_a_filter_underestimates_is_not_something_left(record):
 def test_noise_is_no_excuse_for_a_value_that_is_off(record):
     first, drawn = judged(record, 1.05 * STIFFNESS)
     assert drawn is not first, "nothing was drawn"
-    assert drawn.prediction.left > 0.8 * first.prediction.left > NEGLIGIBLE
-    assert not adequate(drawn)
+    assert drawn.prediction.left() > 0.8 * first.prediction.left() > THRESHOLDS.negligible
+    assert not is_noise_only(drawn)
 
 
 def test_noise_is_no_excuse_for_an_offset_that_is_a_bias(record):
@@ -57,7 +58,7 @@ def test_noise_is_no_excuse_for_an_offset_that_is_a_bias(record):
     channels["acceleration"] = channels["acceleration"] + 0.1 * np.std(channels["acceleration"])
     first, drawn = judged(jfsm.Record(record.time, **channels), STIFFNESS)
     assert drawn is not first, "nothing was drawn"
-    assert drawn.prediction.left > 0.8 * first.prediction.left > NEGLIGIBLE
+    assert drawn.prediction.left() > 0.8 * first.prediction.left() > THRESHOLDS.negligible
 
 
 def test_what_is_measured_anew_has_the_noise_of_the_base():

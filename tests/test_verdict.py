@@ -1,6 +1,8 @@
 """The verdict over scorecards that are made up."""
 
+import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,7 +10,7 @@ import pytest
 
 import jfsm
 from jfsm.diagnosis._effect import Effect, key_of
-from jfsm.diagnosis.evidence.evidence import Evidence, Measure, SetAside, Setting, map_on
+from jfsm.diagnosis.evidence.evidence import Evidence, Measure, NotMeasuredError, SetAside, Setting, map_on
 from jfsm.diagnosis.evidence.held_out import HeldOutErrors
 from jfsm.diagnosis.evidence.prediction import Prediction
 from jfsm.diagnosis.evidence.scorecard import GIVEN, REFITTED, EffectCard, OtherShapes, Scorecard
@@ -683,3 +685,72 @@ def test_a_check_decides_below_at_and_above_its_limit(row: Row, side: int):
     passes = {-1: row.relation in ("<", "<="), 0: row.relation in ("<=", ">="), 1: row.relation in (">", ">=")}[side]
     assert found.relation == row.relation and found.passed is passes
     assert outcome(decision) == (row.passes if passes else row.fails)
+
+
+def drawn(seed: int) -> Evidence:
+    """Made-up evidence of any kind: laws, faults and pairs, with maps, held-out runs and a model error at times."""
+    rng = np.random.default_rng(seed)
+    names = ["coulomb", "cubic_hardening", "quadratic_damping", "sine_stiffness", "lugre", "preload"]
+    chosen = [(name,) for name in rng.choice(names, rng.integers(1, 5), replace=False)]
+    chosen += [("coulomb", "cubic_hardening")] * int(rng.integers(2))
+
+    def power() -> float:
+        return float(rng.choice([0.0, 1e-4, 2e-3, 0.05, 0.4]))
+
+    cards = [
+        card(float(rng.normal(1000, 500)), power(), *causes, whiteness=rng.choice([0.0, 0.3])) for causes in chosen
+    ]
+    baselines = given(0.0, power()), refit(float(rng.uniform(-5, 1000)), power())
+    return evidence_of(
+        *baselines,
+        *cards,
+        shapes=float(rng.choice([0.0, 30.0, 500.0])),
+        maps={one.key: power() for one in (*baselines, *cards)} if rng.integers(2) else None,
+        held_out=held(float(rng.uniform(0, 2)), interval=(float(rng.uniform(-1, 0.5)), 0.9))
+        if rng.integers(2)
+        else None,
+        set_aside=(SetAside("stribeck@0-1", "not fitted", share=0.1),),
+        finished=bool(rng.integers(4)),
+    )
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_every_candidate_has_a_reason_and_every_verdict_the_check_that_gave_it(seed: int):
+    evidence = drawn(seed)
+    decision = judge(evidence)
+    for key in (*(one.key for one in evidence.candidates), "stribeck@0-1"):
+        assert decision.reasons.get(key) or key == decision.winner, key
+        assert decision.probability(key) == np.prod([f.size for f in decision.factors.get(key, [Factor("", 0.0)])])
+        assert 0.0 <= decision.probability(key) <= 1.0
+    if decision.verdict == "undecided":
+        assert decision.stopped_by in decision.checks and not decision.stopped_by.passed
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_evidence_that_went_through_json_gives_the_same_decision(seed: int):
+    evidence = drawn(seed)
+    decision = judge(evidence)
+    written = json.loads(json.dumps([evidence.plain, decision.plain], allow_nan=False))
+    assert judge(Evidence.of_plain(written[0])) == decision == Decision.of_plain(written[1])
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_a_better_card_gives_no_worse_verdict(seed: int):
+    rng = np.random.default_rng(seed)
+    found = card(float(rng.uniform(1010, 9000)), float(rng.choice([0.0, 0.002, 0.01, 0.04])), "coulomb")
+    better = replace(found, evidence=found.evidence + 100, prediction=card(0.0, 0.0).prediction, whiteness=0.0)
+    assert judged(found).verdict != "cause" or judged(better).verdict == "cause"
+
+
+def test_what_was_not_measured_is_missed_and_not_made_up():
+    asked = evidence_of(WRONG)
+    written = json.loads(json.dumps(asked.plain))
+    with pytest.raises(NotMeasuredError, match="was not asked"):
+        judge(Evidence.of_plain(written))
+
+
+def test_another_threshold_gives_another_verdict_and_every_number_is_explained():
+    evidence = evidence_of(card(9000.0, 0.01, "coulomb"))
+    assert judge(evidence).verdict == "cause"
+    assert judge(evidence, replace(THRESHOLDS, named=0.99, family=0.99)).verdict == "undecided"
+    assert all(number.unit and number.means and number.source for number in THRESHOLDS.explained().values())
