@@ -19,7 +19,7 @@ from ..evidence.scorecard import GIVEN, REFITTED
 from ..thresholds import THRESHOLDS, Thresholds
 from .bench import Bench
 from .checks import checked
-from .confirmed import confirm, falls_out_of_step
+from .confirmed import confirm, stays_in_step
 from .decision import MODEL, Decision
 from .judgement import decided
 from .right_shape import WRONG_SHAPE
@@ -32,11 +32,13 @@ def judge(evidence: Evidence, limits: Thresholds = THRESHOLDS) -> Decision:
     readings does not.
     """
     decision = _concluded(evidence, limits, long_run=False)
-    behind = evidence_behind(decision, evidence)
-    if decision.verdict == "consistent" and (row := falls_out_of_step(behind, limits)) is not None:
-        again = _concluded(evidence, limits, long_run=True)
-        decision = replace(again, checks=(*decision.checks, row, *again.checks))
-    return decision
+    row = stays_in_step(evidence_behind(decision, evidence), limits) if decision.verdict == "consistent" else None
+    if row is None:
+        return decision
+    if row.passed:
+        return replace(decision, checks=(*decision.checks, row))
+    again = _concluded(evidence, limits, long_run=True)
+    return replace(again, checks=(*decision.checks, row, *again.checks))
 
 
 def evidence_behind(decision: Decision, evidence: Evidence) -> Evidence:

@@ -215,10 +215,10 @@ class _Judgement:
         bench.less_sure(of, "other shapes would gain beside it", 1.0 - 0.5 * min(far, 1.0))
         if far > 1.0:
             bench.less_sure(of, "it is refused", 0.0)
-        if bench.probability(winner.key) >= bench.limits.named:
+        row = self._probability_of(winner)
+        if row.passed:
             return "parameters"
-        failed = [check for check in checks if not check.passed]
-        bench.stop(failed[0] if failed else self._probability_of(winner))
+        bench.stop(next((check for check in checks if not check.passed), row))
         return "undecided"
 
     def _probability_of(self, winner: Scorecard) -> Check:
