@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jfsm
-from jfsm.diagnosis import _diagnose
+from jfsm.diagnosis import _diagnose, _weighed
 from jfsm.diagnosis._candidates import Candidate, as_promising, promising
 from jfsm.diagnosis._effect import Effect
 from jfsm.diagnosis._gain import Gain
@@ -79,7 +79,7 @@ def decided(searched, believed, monkeypatch):
 
     def of(gain: Gain) -> jfsm.Diagnosis:
         monkeypatch.setattr(_diagnose, "_looked_into", lambda *arguments: searched)
-        monkeypatch.setattr(_diagnose, "measure_gain", lambda *arguments: (gain, []))
+        monkeypatch.setattr(_weighed, "measure_gain", lambda *arguments: (gain, []))
         return jfsm.diagnose(made(duffing), believed, causes=FEW, key=jax.random.key(0))
 
     return of
