@@ -8,7 +8,6 @@ from functools import cached_property
 import jax
 
 from ..structures import Clipping, Structure
-from ._candidates import Candidate
 from ._chance import noise_levels
 from ._effect import key_of
 from ._forgiving import forgiving
@@ -56,7 +55,7 @@ class Weighed:
         """Scorecards, and what is measured when it is asked for."""
         measure = Measure(self._other_shapes, self._with_map, self._held_out, self._with_model_error)
         cards = {card.key: card for card in self._cards()}
-        return Evidence(self._setting(), cards, measure, tuple(set_aside(self.found)))
+        return Evidence(self._setting(), cards, measure, tuple(set_aside(self.found, cut=self.problem.limit.over)))
 
     def behind(self, decision: Decision) -> "Weighed":
         """What a decision on this evidence rests on."""
@@ -130,14 +129,14 @@ class Weighed:
         return self.other.evidence
 
 
-def set_aside(found: Searched) -> Iterator[SetAside]:
-    """The candidates that were not fitted to their end, and why."""
+def set_aside(found: Searched, *, cut: bool) -> Iterator[SetAside]:
+    """The candidates that were not fitted to their end, of a search that may have been `cut` short, and why."""
     for behind in sorted(found.behind, key=lambda behind: behind.nats):
         nats = behind.nats if math.isfinite(behind.nats) else None
         yield SetAside(key_of(behind.effects), _why_behind(behind), nats=nats)
     for candidate in sorted(found.left_out, key=lambda candidate: -(candidate.share or 0.0)):
         share = candidate.share or 0.0
-        yield SetAside(key_of(candidate.effects), _why_left_out(candidate), share=share)
+        yield SetAside(key_of(candidate.effects), _why_left_out(share, cut=cut), share=share)
 
 
 def _why_behind(behind: LeftBehind) -> str:
@@ -147,5 +146,6 @@ def _why_behind(behind: LeftBehind) -> str:
     return f"{met}: {behind.nats:.3g} nats behind the best where a misfit is still forgiven"
 
 
-def _why_left_out(candidate: Candidate) -> str:
-    return f"not fitted: explains {candidate.share or 0.0:.0%} of the missing force, and other laws more"
+def _why_left_out(share: float, *, cut: bool) -> str:
+    rest = "the time was over" if cut else "other laws more"
+    return f"not fitted: explains {share:.0%} of the missing force, and {rest}"

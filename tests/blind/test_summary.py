@@ -409,7 +409,7 @@ def test_only_a_call_for_two_effects_draws_them(monkeypatch: pytest.MonkeyPatch)
 def test_a_repeated_call_examines_only_the_seeds_that_are_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     asked = []
 
-    def answers(seeds, drawing, jobs):
+    def answers(seeds, drawing, jobs, cards=None):
         for seed in seeds:
             asked.append(seed)
             yield row("none", "consistent", seed=seed, drawing=drawing)
@@ -433,7 +433,9 @@ def test_a_seed_without_a_fair_challenge_is_left_out(tmp_path: Path, monkeypatch
 
     monkeypatch.setattr(blind, "drawn", drawn)
     monkeypatch.setattr(blind, "diagnosed", lambda challenge: None)
-    monkeypatch.setattr(blind, "answers", lambda seeds, drawing, jobs: (blind.examine(seed, drawing) for seed in seeds))
+    monkeypatch.setattr(
+        blind, "answers", lambda seeds, drawing, jobs, cards=None: (blind.examine(seed, drawing) for seed in seeds)
+    )
     out, told = tmp_path / "rows.jsonl", []
     assert [row["seed"] for row in blind.run(range(3), {}, 1, out, told.append)] == [0, 2]
     assert len(out.read_text().splitlines()) == 2
@@ -441,7 +443,7 @@ def test_a_seed_without_a_fair_challenge_is_left_out(tmp_path: Path, monkeypatch
 
 
 def test_what_is_done_is_kept_when_the_examination_is_interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    def answers(seeds, drawing, jobs):
+    def answers(seeds, drawing, jobs, cards=None):
         yield row("none", "consistent", seed=0, drawing=drawing)
         raise KeyboardInterrupt
 
