@@ -40,7 +40,7 @@ import json
 from jfsm.diagnosis import Evidence, Thresholds, judge
 
 written = json.load(open("run.json"))
-judge(Evidence.of_plain(written["evidence"]))                      # the same verdict
+judge(Evidence.of_plain(written["evidence"]))  # the same verdict
 judge(Evidence.of_plain(written["evidence"]), Thresholds(named=0.9))  # with another threshold
 ```
 

@@ -70,7 +70,8 @@ def _with_model_error(decision: Decision, evidence: Evidence, limits: Thresholds
     if not other.setting.finished:
         return _cut_short(decision)
     again = _decided(other, limits, long_run)
-    return replace(again, checks=(*decision.checks, *again.checks))
+    reasons = {**decision.reasons, **again.reasons}  # some are not compared once more
+    return replace(again, checks=(*decision.checks, *again.checks), reasons=reasons)
 
 
 def _decided(evidence: Evidence, limits: Thresholds, long_run: bool) -> Decision:
