@@ -31,9 +31,9 @@ def differ(apart: Trial, shared: Trial) -> bool:
 
     No two measured records are quite alike: they must explain half of what the other leaves, if it leaves anything.
     """
-    tells = not np.any(unexplained(shared)) and is_noise_only(apart)
+    noise_only = not np.any(unexplained(shared)) and is_noise_only(apart)
     return apart.evidence - shared.evidence > THRESHOLDS.searched and (
-        tells or explained(apart, shared) >= THRESHOLDS.half
+        noise_only or explained(apart, shared) >= THRESHOLDS.half
     )
 
 

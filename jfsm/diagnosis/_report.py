@@ -10,6 +10,7 @@ import numpy as np
 
 from ..identification import Nuisances
 from ..records import Record
+from ..reporting import stopping_line
 from ..structures import PARAMETER_CAUSES, AbstractTerm, Cause, Clipping, Structure, causes, is_offset
 from ._between import Difference, differences
 from ._candidates import Candidate
@@ -31,9 +32,10 @@ from ._trial import Trial
 from ._unfinished import Unfinished
 from ._wandering import zeros
 from .evidence.evidence import Evidence
+from .evidence.plain import as_plain
 from .evidence.scorecard import GIVEN
 from .thresholds import THRESHOLDS
-from .verdict.decision import MODEL, Decision
+from .verdict.decision import Decision
 
 _SHOWN = 2000
 """Points of a curve in the report."""
@@ -79,7 +81,7 @@ class Drawn:
     def __call__(self) -> dict[str, Any]:
         shape, start = shape_of(self.missing) if self.with_shape else None, float(self.record.time[0])
         return {
-            "shape": None if shape is None else {**_plain(shape._asdict()), "words": shape.words},
+            "shape": None if shape is None else {**as_plain(shape._asdict(), lossless=False), "words": shape.words},
             "curves": {
                 "holdout": _holdout(self.runs),
                 **curves(self.missing, self.record.units, self.term),
@@ -107,13 +109,14 @@ def assemble(
     findings = _findings(reached, trials, model, records[0])
     if decision.verdict == "cause":
         findings += tuple(finding(sensor, units[sensor.at[0]]) for sensor in clipped)
+    left_out = sorted(tested.left_out, key=lambda c: -(c.share or 0.0))
     candidates = (
         *(
             _candidate(t, decision, refitted, tested.unfit(t), model, units)
             for t in sorted(trials, key=lambda t: -t.evidence)
         ),
-        *(_left_behind(b, decision) for b in sorted(tested.behind, key=lambda b: b.nats)),
-        *(_passed_over(c, decision) for c in sorted(tested.left_out, key=lambda c: -(c.share or 0.0))),
+        *(_not_fitted(b.effects, decision) for b in sorted(tested.behind, key=lambda b: b.nats)),
+        *(_not_fitted(c.effects, decision, c.share or 0.0) for c in left_out),
     )
     winner = reached.winner if decision.winner != GIVEN else refitted
     refit = {
@@ -147,9 +150,9 @@ def assemble(
         "record": _record(records),
         "model": model.describe(units),
         "extended": extended.describe(units),
-        "findings": [_plain(f) for f in findings],
-        "candidates": [_plain(c) for c in candidates],
-        "refitted": {p: {"given": model.values()[p], **_plain(e)} for p, e in refit.items()},
+        "findings": [as_plain(f, lossless=False) for f in findings],
+        "candidates": [as_plain(c, lossless=False) for c in candidates],
+        "refitted": {p: {"given": model.values()[p], **as_plain(e, lossless=False)} for p, e in refit.items()},
         "between_records": {one.path: [list(interval) for interval in one.intervals] for one in between},
         "gain": None if gain is None else _gain(gain),
         "notes": list(notes),
@@ -324,14 +327,10 @@ def _candidate(
     )  # fmt: skip
 
 
-def _left_behind(b: LeftBehind, decision: Decision) -> CandidateResult:
-    why = decision.reasons[key_of(b.effects)]
-    return CandidateResult(names(b.effects), places(b.effects), -math.inf, {}, 0.0, 0.0, {}, why)
-
-
-def _passed_over(c: Candidate, decision: Decision) -> CandidateResult:
-    why = decision.reasons[key_of(c.effects)]
-    return CandidateResult(names(c.effects), places(c.effects), -math.inf, {}, c.share or 0.0, 0.0, {}, why)
+def _not_fitted(effects: Sequence[Effect], decision: Decision, share: float = 0.0) -> CandidateResult:
+    """A candidate that was not fitted to its end; the `share` of the missing force that it explains stands for κ."""
+    why = decision.reasons[key_of(effects)]
+    return CandidateResult(names(effects), places(effects), -math.inf, {}, share, 0.0, {}, why)
 
 
 def _words(
@@ -376,18 +375,9 @@ def _words(
         return "The search was ended before it was finished, and nothing that was tried until then is found.", _GO_ON
     more = "measure the velocity beside the displacement" if imposed else "measure the missing channels"
     return (
-        f"Something is wrong beyond noise, and this record cannot tell what.{_stopped(decision)}",
+        f"Something is wrong beyond noise, and this record cannot tell what. {stopping_line(decision.plain)}".strip(),
         f"Record a second run with another amplitude, or {more}.",
     )
-
-
-def _stopped(decision: Decision) -> str:
-    """What stopped the verdict, as a sentence."""
-    row = decision.stopped_by
-    if row is None:
-        return ""
-    card = "the model" if row.of == MODEL else row.of.replace("+", " + ")
-    return f" Stopped by the check `{row.name}` of {card}: {row.says}."
 
 
 def _in_each(difference: Difference, unit: str) -> str:
@@ -473,16 +463,3 @@ def _holdout(runs: list[dict]) -> dict[str, Any] | None:
 
 def _list(values) -> list:
     return [float(v) if math.isfinite(v) else None for v in np.asarray(values).ravel()]
-
-
-def _plain(value: Any) -> Any:
-    """Dataclasses, tuples and NumPy numbers as plain types."""
-    if hasattr(value, "__dataclass_fields__"):
-        return {name: _plain(getattr(value, name)) for name in value.__dataclass_fields__}
-    if isinstance(value, dict):
-        return {k: _plain(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(v) for v in value]
-    if isinstance(value, float | np.floating):
-        return float(value) if math.isfinite(value) else None
-    return value

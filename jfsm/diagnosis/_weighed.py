@@ -91,12 +91,14 @@ class Weighed:
 
     def _cards(self) -> Iterator[Scorecard]:
         every, model, records = self.found.every, self.problem.model, self.problem.records
-        tells, stands_for_the_drive = untold(records), in_step(records)
+        why_not_identifiable, stands_for_the_drive = untold(records), in_step(records)
         for t in every:
-            if self.model_error:  # laws of time are none here, whatever the records tell
+            if self.model_error:  # laws of time are none here, whatever the records show
                 yield scorecard(t, every, model)
             else:
-                yield scorecard(t, every, model, in_step=stands_for_the_drive(t), not_identifiable=tells(t))
+                yield scorecard(
+                    t, every, model, in_step=stands_for_the_drive(t), not_identifiable=why_not_identifiable(t)
+                )
 
     def _other_shapes(self, key: str) -> OtherShapes:
         return self.found.lack(self.trial(key))
@@ -131,10 +133,10 @@ class Weighed:
 
 def set_aside(found: Searched, *, cut: bool) -> Iterator[SetAside]:
     """The candidates that were not fitted to their end, of a search that may have been `cut` short, and why."""
-    for behind in sorted(found.behind, key=lambda behind: behind.nats):
+    for behind in found.behind:
         nats = behind.nats if math.isfinite(behind.nats) else None
         yield SetAside(key_of(behind.effects), _why_behind(behind), nats=nats)
-    for candidate in sorted(found.left_out, key=lambda candidate: -(candidate.share or 0.0)):
+    for candidate in found.left_out:
         share = candidate.share or 0.0
         yield SetAside(key_of(candidate.effects), _why_left_out(share, cut=cut), share=share)
 

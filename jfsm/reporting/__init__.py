@@ -21,4 +21,5 @@ from ._text import inspection_text as inspection_text
 from ._text import print_diagnosis as print_diagnosis
 from ._text import print_inspection as print_inspection
 from ._why import print_why as print_why
+from ._why import stopping_line as stopping_line
 from ._why import why_text as why_text

@@ -66,15 +66,16 @@ def print_inspection(d: Mapping[str, Any], console: Console | None = None) -> No
 
 def diagnosis_text(d: Mapping[str, Any], width: int = 100) -> str:
     """The same as `print_diagnosis` shows, as plain text in lines of `width` characters."""
-    return _plain(_diagnosis(d, width), width)
+    return plain_text(_diagnosis(d, width), width)
 
 
 def inspection_text(d: Mapping[str, Any], width: int = 100) -> str:
     """The same as `print_inspection` shows, as plain text in lines of `width` characters."""
-    return _plain(_inspection(d, width), width)
+    return plain_text(_inspection(d, width), width)
 
 
-def _plain(renderable: RenderableType, width: int) -> str:
+def plain_text(renderable: RenderableType, width: int) -> str:
+    """What the terminal would show, without colours, in lines of `width` characters."""
     stream = io.StringIO()
     Console(file=stream, width=width, color_system=None, force_terminal=False).print(renderable)
     return "\n".join(line.rstrip() for line in stream.getvalue().splitlines()) + "\n"

@@ -1,8 +1,8 @@
 """Why a verdict came out as it did: the checks that decided, from the log of a decision."""
 
 import difflib
-import io
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,6 +12,7 @@ from rich.text import Text
 
 from jfsm.reporting._quantities import number, percent
 from jfsm.reporting._tables import Table
+from jfsm.reporting._text import plain_text
 from jfsm.reporting._wording import cause_name, place_name
 
 Dictionary = Mapping[str, Any]
@@ -65,21 +66,20 @@ def checks_of(d: Dictionary, cause: str) -> dict[str, list[Dictionary]]:
     return {key: [row for row in decision.get("checks") or () if row["of"] == key] for key in chosen}
 
 
-def checks_table(rows: Sequence[Dictionary], title: str = "Checks", *, whose: bool = False) -> Table:
-    """Checks as a table: stage, what was found, the limit, and the outcome; with `whose`, of which hypothesis."""
+def checks_table(rows: Sequence[Dictionary], title: str) -> Table:
+    """Checks as a table: stage, of which hypothesis, what was found, the limit, and the outcome."""
     cells = tuple(
         (
             STAGES[row["stage"]],
-            *((hypothesis_name(row["of"]),) if whose else ()),
+            hypothesis_name(row["of"]),
             row["says"],
             _measured(row),
-            {True: "passed", False: "failed", None: "not asked"}[row["passed"]],
+            "passed" if row["passed"] else "failed",
         )
         for row in rows
     )
-    headings = ("stage", *(("of",) if whose else ()), "finding", "measured", "outcome")
-    words = frozenset(range(len(headings))) - {len(headings) - 2}
-    return Table(title, headings, cells, words, frozenset(k for k, row in enumerate(rows) if row["passed"] is False))
+    failed = frozenset(k for k, row in enumerate(rows) if not row["passed"])
+    return Table(title, ("stage", "of", "finding", "measured", "outcome"), cells, frozenset({0, 1, 2, 4}), failed)
 
 
 def probability_line(d: Dictionary, key: str) -> str:
@@ -107,14 +107,12 @@ def print_why(d: Dictionary, cause: str | None = None, console: Console | None =
 
 def why_text(d: Dictionary, cause: str | None = None, width: int = 100) -> str:
     """The same as `print_why` shows, as plain text."""
-    stream = io.StringIO()
-    Console(file=stream, width=width, color_system=None, force_terminal=False).print(_why(d, cause))
-    return "\n".join(line.rstrip() for line in stream.getvalue().splitlines()) + "\n"
+    return plain_text(_why(d, cause), width)
 
 
-def stopping_line(d: Dictionary) -> str:
-    """The check that left a verdict undecided, and what would have let it pass; empty for another verdict."""
-    stopped = (d.get("decision") or {}).get("stopped_by")
+def stopping_line(decision: Dictionary) -> str:
+    """The check that left a decision open, and what would have let it pass; empty for any other."""
+    stopped = decision.get("stopped_by")
     if stopped is None:
         return ""
     return f"Stopped by the check `{stopped['name']}` of {hypothesis_name(stopped['of'])}: {stopped['says']}."
@@ -123,7 +121,7 @@ def stopping_line(d: Dictionary) -> str:
 def _why(d: Dictionary, cause: str | None) -> RenderableType:
     if cause is None:
         decision = d.get("decision") or {}
-        lines = [f"Verdict: {d['verdict']}.", stopping_line(d), probability_line(d, decision.get("winner", ""))]
+        lines = [f"Verdict: {d['verdict']}.", stopping_line(decision), probability_line(d, decision.get("winner", ""))]
         return Group(*map(Text, filter(None, lines)), *_in_groups(decisive_checks(d)))
     found, reasons = checks_of(d, cause), (d.get("decision") or {}).get("reasons") or {}
     shown: list[RenderableType] = []
@@ -178,10 +176,7 @@ def _measured(row: Dictionary) -> str:
 
 
 def _probability(factors: Sequence[Dictionary]) -> float:
-    product = 1.0 if factors else 0.0
-    for factor in factors:
-        product *= float(factor["size"])
-    return product
+    return math.prod(float(factor["size"]) for factor in factors) if factors else 0.0
 
 
 def _share(factor: Dictionary) -> str:

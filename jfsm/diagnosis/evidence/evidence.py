@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .held_out import HeldOutErrors
-from .plain import as_plain, number
+from .plain import as_plain
 from .prediction import Prediction
 from .scorecard import GIVEN, REFITTED, OtherShapes, Scorecard
 
@@ -140,19 +140,13 @@ def map_on(key: str) -> str:
     return key + _MAP
 
 
-def without_map(key: str) -> str:
-    """Key of the hypothesis that a map was added to."""
-    return key.removesuffix(_MAP)
-
-
 def has_map(key: str) -> bool:
     return key.endswith(_MAP)
 
 
 def _numbers(written: Mapping[str, Any]) -> dict[str, Any]:
     return {
-        name: [number(v) for v in value] if isinstance(value, list) else number(value)
-        for name, value in written.items()
+        name: [float(v) for v in value] if isinstance(value, list) else float(value) for name, value in written.items()
     }
 
 

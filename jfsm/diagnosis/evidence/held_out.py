@@ -31,11 +31,6 @@ class HeldOutErrors:
         return self.interval[0] > 0
 
     @property
-    def harmful(self) -> bool:
-        """Whether the hypothesis predicts worse by more than chance."""
-        return self.closable and self.interval[1] < 0
-
-    @property
     def closed(self) -> float:
         """Share of the closable error that is closed: (before - after) / (before - floor), at most 1.
 

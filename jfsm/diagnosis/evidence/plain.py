@@ -1,4 +1,4 @@
-"""Values as JSON has them, and back, without loss."""
+"""Values as JSON has them."""
 
 import math
 from typing import Any
@@ -6,23 +6,26 @@ from typing import Any
 import numpy as np
 
 
-def as_plain(value: Any) -> Any:
-    """Dataclasses, named tuples, tuples and NumPy numbers as plain types; numbers without bounds as their names."""
+def as_plain(value: Any, *, lossless: bool = True) -> Any:
+    """Dataclasses, named tuples, tuples, arrays and NumPy numbers as plain types.
+
+    Numbers without bounds, which JSON does not have, are their names, from which `float` makes them again; None if it
+    need not be `lossless`.
+    """
+
+    def plain(each: Any) -> Any:
+        return as_plain(each, lossless=lossless)
+
     if hasattr(value, "__dataclass_fields__"):
-        return {name: as_plain(getattr(value, name)) for name in value.__dataclass_fields__}
+        return {name: plain(getattr(value, name)) for name in value.__dataclass_fields__}
     if hasattr(value, "_asdict"):
-        return as_plain(value._asdict())
+        return plain(value._asdict())
     if isinstance(value, dict):
-        return {name: as_plain(each) for name, each in value.items()}
+        return {name: plain(each) for name, each in value.items()}
     if isinstance(value, list | tuple | np.ndarray):
-        return [as_plain(each) for each in value]
-    if isinstance(value, bool | np.bool_):
-        return bool(value)
-    if isinstance(value, float | np.floating):
-        return float(value) if math.isfinite(value) else str(float(value))
-    return int(value) if isinstance(value, np.integer) else value
-
-
-def number(written: float | str) -> float:
-    """A number that `as_plain` wrote."""
-    return float(written)
+        return [plain(each) for each in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value) if lossless else None
+    return value

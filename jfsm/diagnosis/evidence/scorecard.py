@@ -11,7 +11,7 @@ from .._between import differences
 from .._effect import Effect
 from .._trial import Trial
 from .own_values import at_bounds, offset_cost, prior_cost
-from .plain import as_plain, number
+from .plain import as_plain
 from .prediction import Prediction
 
 GIVEN, REFITTED = "given", "refitted"
@@ -133,8 +133,8 @@ class Scorecard:
     def of_plain(cls, written: Mapping[str, Any]) -> "Scorecard":
         """What `plain` was made of."""
         effects = tuple(EffectCard(**{**e, "at": tuple(e["at"])}) for e in written["effects"])
-        sets = {name: np.array([number(v) for v in values]) for name, values in written["prediction"].items()}
-        numbers = {name: number(v) for name, v in written.items() if isinstance(v, float | str) and name in _NUMBERS}
+        sets = {name: np.array([float(v) for v in values]) for name, values in written["prediction"].items()}
+        numbers = {name: float(v) for name, v in written.items() if isinstance(v, float | str) and name in _NUMBERS}
         tuples = {name: tuple(written[name]) for name in ("at_bounds", "special_cases")}
         return cls(**{**written, **numbers, **tuples, "effects": effects, "prediction": Prediction(**sets)})
 

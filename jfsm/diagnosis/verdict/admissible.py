@@ -26,7 +26,7 @@ def judge_candidates(bench: Bench) -> None:
     for card in bench.candidates:
         bench.reasons[card.key] = _first_reason(card, bench, (*_POSSIBLE, *_WORTH_IT))
     baselines = (bench.given, bench.refitted)
-    explained = [card for card in bench.told if not bench.reasons[card.key]]
+    explained = [card for card in bench.apart_from_the_drive if not bench.reasons[card.key]]
     if any(map(bench.noise_only, (*baselines, *explained))):
         for card in bench.candidates:
             bench.reasons[card.key] = bench.reasons[card.key] or _takes_the_drives_place(card, bench)
@@ -53,8 +53,7 @@ def _stays_bounded(card: Scorecard, bench: Bench) -> Reason:
 
 def _law_is_itself(card: Scorecard, bench: Bench) -> Reason:
     says = card.is_really or "with the numbers found, its law is no other one"
-    another = bool(card.is_really)
-    done = bench.check("law_is_itself", card.key, another, 0, says)
+    done = bench.check("law_is_itself", card.key, bool(card.is_really), 0, says)
     return "" if done.passed else says
 
 
@@ -135,7 +134,7 @@ def is_constant(card: Scorecard) -> bool:
 def _second_effect_pays(card: Scorecard, bench: Bench) -> Reason:
     if len(card.effects) == 1:
         return ""
-    singles = [alone for alone in bench.told if len(alone.effects) == 1]
+    singles = [alone for alone in bench.apart_from_the_drive if len(alone.effects) == 1]
     best = max(singles, key=lambda alone: alone.evidence, default=None)
     for alone in singles:
         mine = alone is best or alone.effects[0] in card.effects
@@ -149,13 +148,13 @@ def _is_enough(alone: Scorecard, pair: Scorecard, bench: Bench) -> Reason:
     if _shows_as_a_bias(pair, alone, bench):
         return ""
     absorbed = _may_be_absorbed(pair, alone, bench)
-    untold = bench.noise_only(pair) and (absorbed or not bench.shows(alone))
-    prespecified = untold and absorbed and bench.noise_only(alone)
+    unseen = bench.noise_only(pair) and (absorbed or not bench.shows(alone))
+    prespecified = unseen and absorbed and bench.noise_only(alone)
     least = bench.limits.significant if prespecified else bench.limits.searched
     nats = pair.evidence - alone.evidence
     says = f"gains {shown(nats)} nats over {alone.label} alone; more than {least:.4g} are needed"
     probable = bench.check("second_effect_pays", pair.key, nats, least, says).passed
-    if untold:  # predictions do not tell
+    if unseen:  # predictions do not separate the two
         return "" if probable else "is about as probable"
     return "" if probable and _predicts_better(alone, pair, bench) else "explains it about as well"
 
@@ -176,23 +175,24 @@ def _predicts_better(alone: Scorecard, pair: Scorecard, bench: Bench) -> bool:
 
 def _no_bias_beside_it(card: Scorecard, bench: Bench) -> Reason:
     """No single effect is an alternative to the same with a bias that an offset hardly stands for."""
-    pairs = [pair for pair in bench.told if len(pair.effects) > 1 and set(card.effects) < set(pair.effects)]
-    for pair in pairs:
-        if _adds(pair, card) != ACCELERATION_BIAS or not _hard_to_believe(card, ACCELERATION_BIAS, bench):
-            continue
-        nats = pair.evidence - card.evidence
-        most = bench.limits.bias
+    pairs = [pair for pair in bench.apart_from_the_drive if set(card.effects) < set(pair.effects)]
+    for pair in (pair for pair in pairs if _adds_a_bias(pair, card, bench)):
+        nats, most = pair.evidence - card.evidence, bench.limits.bias
         says = f"with a bias of the accelerometer it gains {shown(nats)} nats; {most:.4g} at most may be an offset's"
-        if not bench.check("no_bias_beside_it", card.key, nats, bench.limits.bias, says).passed:
+        if not bench.check("no_bias_beside_it", card.key, nats, most, says).passed:
             return "holds only with an offset that is a bias"
     return ""
 
 
 def _shows_as_a_bias(pair: Scorecard, alone: Scorecard, bench: Bench) -> bool:
-    """Whether it has a bias beside one effect alone that an offset hardly stands for. No force that is missing makes an
+    """Whether it has a bias that an offset of one effect alone would not do for. No force that is missing makes an
     acceleration's mean, so what either leaves does not speak against it."""
-    bias = _adds(pair, alone) == ACCELERATION_BIAS and _hard_to_believe(alone, ACCELERATION_BIAS, bench)
-    return bias and pair.evidence - alone.evidence > bench.limits.bias
+    return _adds_a_bias(pair, alone, bench) and pair.evidence - alone.evidence > bench.limits.bias
+
+
+def _adds_a_bias(pair: Scorecard, alone: Scorecard, bench: Bench) -> bool:
+    """Whether a pair has a bias instead of an offset of one effect alone that is hard to believe."""
+    return _adds(pair, alone) == ACCELERATION_BIAS and _hard_to_believe(alone, ACCELERATION_BIAS, bench)
 
 
 def _may_be_absorbed(pair: Scorecard, alone: Scorecard, bench: Bench) -> bool:

@@ -8,7 +8,7 @@ from ..evidence.evidence import Evidence, Predicted
 from ..evidence.scorecard import Scorecard
 from ..thresholds import Thresholds
 from .checks import Check, checked
-from .decision import Factor
+from .decision import Factor, product_of
 
 
 @dataclass
@@ -37,7 +37,7 @@ class Bench:
         return self.evidence.refitted
 
     @property
-    def told(self) -> list[Scorecard]:
+    def apart_from_the_drive(self) -> list[Scorecard]:
         """Candidates that do not take the place of the drive."""
         return [card for card in self.candidates if not card.in_step]
 
@@ -81,10 +81,8 @@ class Bench:
         self.factors = {key: [Factor("share among the alternatives", share)] for key, share in shares.items()}
 
     def probability(self, key: str) -> float:
-        product = 1.0
-        for factor in self.factors.get(key, [Factor("", 0.0)]):
-            product *= factor.size
-        return product
+        """Probability of a hypothesis so far; 0 for one that is no alternative."""
+        return product_of(self.factors.get(key, ()))
 
     def less_sure(self, keys: Iterable[str], name: str, size: float) -> None:
         """One more factor of the probabilities of some alternatives."""

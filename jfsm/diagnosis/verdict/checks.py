@@ -1,6 +1,7 @@
 """Every check that a verdict rests on: its stage, what it asks, and the thresholds that limit it."""
 
 from collections.abc import Mapping
+from operator import ge, gt, le, lt
 from typing import Literal, NamedTuple
 
 Stage = Literal["searched", "sensors", "detected", "admissible", "named", "sufficient", "confirmed"]
@@ -312,12 +313,7 @@ CHECKS: Mapping[str, Kind] = {
 }
 """In the order of the stages."""
 
-_HOLDS = {
-    ">=": lambda measured, limit: measured >= limit,
-    "<=": lambda measured, limit: measured <= limit,
-    ">": lambda measured, limit: measured > limit,
-    "<": lambda measured, limit: measured < limit,
-}
+_HOLDS = {">=": ge, "<=": le, ">": gt, "<": lt}
 
 
 def checked(name: str, of: str, measured: float, limit: float, says: str) -> Check:

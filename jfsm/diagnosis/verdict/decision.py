@@ -1,11 +1,11 @@
 """A verdict with every step that led to it."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from ..evidence.plain import as_plain, number
+from ..evidence.plain import as_plain
 from .checks import Check
 
 MODEL = "model"
@@ -17,6 +17,11 @@ class Factor(NamedTuple):
 
     name: str
     size: float
+
+
+def product_of(factors: Sequence[Factor]) -> float:
+    """The probability of these factors; 0 where there are none."""
+    return math.prod(factor.size for factor in factors) if factors else 0.0
 
 
 @dataclass(frozen=True)
@@ -61,8 +66,7 @@ class Decision:
 
     def probability(self, key: str) -> float:
         """Probability of a hypothesis; 0 for one that is no alternative."""
-        factors = self.factors.get(key)
-        return math.prod(factor.size for factor in factors) if factors else 0.0
+        return product_of(self.factors.get(key, ()))
 
     def less_sure(self, name: str, size: float = 0.5) -> "Decision":
         """The decision less sure of every cause, half as sure by default."""
@@ -87,15 +91,15 @@ class Decision:
         """What `plain` was made of."""
 
         def check(row: Mapping[str, Any]) -> Check:
-            return Check(**{**row, "measured": number(row["measured"]), "threshold": number(row["threshold"])})
+            return Check(**{**row, "measured": float(row["measured"]), "threshold": float(row["threshold"])})
 
         stopped = written["stopped_by"]
         made = {
             "checks": tuple(check(row) for row in written["checks"]),
             "factors": {
-                k: tuple(Factor(f["name"], number(f["size"])) for f in v) for k, v in written["factors"].items()
+                k: tuple(Factor(f["name"], float(f["size"])) for f in v) for k, v in written["factors"].items()
             },
-            "explained": {k: number(v) for k, v in written["explained"].items()},
+            "explained": {k: float(v) for k, v in written["explained"].items()},
             "stopped_by": None if stopped is None else check(stopped),
         }
         return cls(**{**written, **made})

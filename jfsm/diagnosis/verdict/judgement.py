@@ -131,7 +131,7 @@ class _Judgement:
         better = bench.check("better_than_given", MODEL, gain, limits.significant, says)
         least = limits.negligible
         says = f"predictions of the model as given leave {left:.2%} of the signal beyond noise; {least:.0%} is seen"
-        visible = bench.check("visible_in_prediction", MODEL, left, limits.negligible, says)
+        visible = bench.check("visible_in_prediction", MODEL, left, least, says)
         slight = not visible.passed and not bench.long_run
         return (slight and not noise_only) or (not better.passed and (noise_only or slight))
 

@@ -64,7 +64,7 @@ def _beside_likelier_laws(winner: Scorecard, bench: Bench) -> None:
         single = len(card.effects) == 1 and bool(card.laws) and card.evidence > winner.evidence
         return single and bench.noise_only(card) and is_possible(card, bench)
 
-    likelier = [card for card in bench.told if wants_a_margin(card)]
+    likelier = [card for card in bench.apart_from_the_drive if wants_a_margin(card)]
     if likelier:
         keys = dict.fromkeys([*bench.factors, *(card.key for card in likelier)])
         _share_out([bench.evidence.cards[key] for key in keys], bench)

@@ -33,8 +33,8 @@ def doubt(card: Scorecard, gained: float, bench: Bench, *, shapeless: bool = Fal
         return far, checks
     rest = limits.rest_with_shape
     says = f"forces of other shapes would explain {shapes.share:.0%} of what it leaves; {rest:.0%} at most may be left"
-    checks.append(bench.check("rest_without_shape", card.key, shapes.share, limits.rest_with_shape, says))
-    return max(far, shapes.share / limits.rest_with_shape), checks
+    checks.append(bench.check("rest_without_shape", card.key, shapes.share, rest, says))
+    return max(far, shapes.share / rest), checks
 
 
 class Settled(NamedTuple):
