@@ -25,6 +25,7 @@ ROOMS = (
     "dynamics",
     "estimation",
     "identification",
+    "mapping",
     "diagnosis",
     "systems",
     "demo",

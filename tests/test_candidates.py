@@ -8,9 +8,7 @@ import pytest
 from references import between_wells
 
 import jfsm
-from jfsm.diagnosis._akin import resting
-from jfsm.diagnosis._begin import Begin, Start
-from jfsm.diagnosis._candidates import (
+from jfsm.diagnosis.hypotheses.candidates import (
     Candidate,
     Laws,
     candidates,
@@ -21,7 +19,9 @@ from jfsm.diagnosis._candidates import (
     own_paths,
     promising,
 )
-from jfsm.diagnosis._effect import Effect
+from jfsm.diagnosis.hypotheses.effect import Effect
+from jfsm.diagnosis.hypotheses.initial_values import Begin, Start
+from jfsm.diagnosis.search.related_laws import resting
 from jfsm.identification import LANES, Nuisances, Posterior, prepare
 
 CHAIN = jfsm.Structure.chain([1.0, 1.0], [20.0, 20.0], [0.2, 0.2])

@@ -3,9 +3,9 @@
 import pytest
 
 import jfsm
-from jfsm.diagnosis._class import class_of
 from jfsm.diagnosis._diagnosis import Finding, Rival
-from jfsm.diagnosis._report import _said
+from jfsm.diagnosis.report.findings import _said
+from jfsm.diagnosis.report.law_class import class_of
 
 PEAK, SPEED = 2.0, 3.0
 LAWS = {

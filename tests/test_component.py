@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import jfsm
 from jfsm.cli import app
-from jfsm.diagnosis._clipped import limited
+from jfsm.diagnosis.channels.clipping import limited
 from jfsm.dynamics._imposed import imposed_motion
 from jfsm.identification import Hypothesis, Posterior, nuisance_unknowns, prepare, with_offsets
 from jfsm.identification._unknowns import free_unknown

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 
 import jfsm
 from jfsm._result import Result
-from jfsm.diagnosis._next import Leading, Variation, _made, _plan, _tried, same_force
+from jfsm.diagnosis.advice.next_test import Leading, Variation, _made, _plan, _tried, same_force
 from jfsm.identification import prepare
 
 MASS, STIFFNESS, DAMPING = 1.0, 40.0, 0.5

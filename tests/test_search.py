@@ -10,21 +10,21 @@ from scipy.integrate import solve_ivp
 
 import jfsm
 from jfsm._limit import UNLIMITED
-from jfsm.diagnosis import _search
-from jfsm.diagnosis._akin import beside_a_spring, instead_of, late_instead, special_cases
-from jfsm.diagnosis._begin import Begin, Start, begun
-from jfsm.diagnosis._candidates import (
+from jfsm.diagnosis.evidence.score_test import Replaced, gains
+from jfsm.diagnosis.evidence.setup import Problem
+from jfsm.diagnosis.hypotheses.candidates import (
     Candidate,
     Laws,
     candidates,
     chosen_causes,
     hypothesis,
 )
-from jfsm.diagnosis._effect import Effect
-from jfsm.diagnosis._pairs import crossed, instead, pairs
-from jfsm.diagnosis._problem import Problem
-from jfsm.diagnosis._score import Replaced, gains
-from jfsm.diagnosis._search import (
+from jfsm.diagnosis.hypotheses.effect import Effect
+from jfsm.diagnosis.hypotheses.initial_values import Begin, Start, begun
+from jfsm.diagnosis.search import searches
+from jfsm.diagnosis.search.pairs import crossed, instead, pairs
+from jfsm.diagnosis.search.related_laws import beside_a_spring, instead_of, late_instead, special_cases
+from jfsm.diagnosis.search.searches import (
     Found,
     LeftBehind,
     fit_model,
@@ -430,11 +430,11 @@ def test_starts_that_begin_best_where_more_or_less_is_forgiven_both_climb(monkey
         Start({0.03: 1.0, 0.01: 3.0}, -4.0),
     ]
     monkeypatch.setattr(
-        _search,
+        searches,
         "rungs",
         lambda start, ladder, limit: (SimpleNamespace(value=np.array([start.top * share])) for share in (0.1, 1.0)),
     )
-    lot = object.__new__(_search._Lot)
+    lot = object.__new__(searches._Lot)
     lot.limit = UNLIMITED
     stood = list(lot._climb(starts, ("first", "second", "third"), 1, (0.1, 0.03, 0.01)))  # pyright: ignore
     assert [float(found.value[0]) for found in stood] == [-0.5, -5.0]

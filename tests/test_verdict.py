@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.diagnosis._effect import Effect, key_of
 from jfsm.diagnosis.evidence.evidence import Evidence, Measure, NotMeasuredError, SetAside, Setting, map_on
 from jfsm.diagnosis.evidence.held_out import HeldOutErrors
 from jfsm.diagnosis.evidence.prediction import Prediction
 from jfsm.diagnosis.evidence.scorecard import GIVEN, REFITTED, EffectCard, OtherShapes, Scorecard
+from jfsm.diagnosis.hypotheses.effect import Effect, key_of
 from jfsm.diagnosis.thresholds import THRESHOLDS
 from jfsm.diagnosis.verdict.confirmed import confirm
 from jfsm.diagnosis.verdict.decision import Check, Decision, Factor

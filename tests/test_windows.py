@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.diagnosis._trial import extent, windows
+from jfsm.diagnosis.evidence.fitted import extent, windows
 from jfsm.identification import Nuisances, prepare
 
 MASS, DAMPING = 2.0, 8.0

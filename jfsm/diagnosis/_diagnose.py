@@ -12,22 +12,22 @@ from ..dynamics import Reconstruction
 from ..records import Record
 from ..reporting import shown_by_default
 from ..structures import Cause, Structure
-from ._candidates import Candidate, chosen_causes
-from ._clipped import limited
-from ._detectable import Silence, detectable, naturally_detectable
 from ._diagnosis import Diagnosis
-from ._holdout import HeldOut, split
-from ._late import Late, in_time, showing_late, slightly_late
-from ._next import Leading
-from ._problem import Problem
-from ._report import Reached, Tested, assemble
-from ._residual import residual
-from ._steps import Progress, Steps
-from ._study import Searched, Study
-from ._trial import Trial
-from ._unfinished import Unfinished
-from ._wandering import steadied
-from ._weighed import HeldOutRuns, Weighed
+from .advice.detection_limits import Silence, detectable, naturally_detectable
+from .advice.next_test import Leading
+from .channels.clipping import limited
+from .channels.delays import Late, in_time, showing_late, slightly_late
+from .channels.drift import steadied
+from .evidence.fitted import Trial
+from .evidence.measured import HeldOutRuns, Weighed
+from .evidence.missing_force import residual
+from .evidence.setup import Problem
+from .evidence.split import HeldOut, split
+from .hypotheses.candidates import Candidate, chosen_causes
+from .report.findings import Reached, Tested, assemble
+from .report.unfinished import Unfinished
+from .search.steps import Progress, Steps
+from .search.study import Searched, Study
 from .verdict.judge import judge
 
 _ROUNDS = 3

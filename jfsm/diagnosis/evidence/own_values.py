@@ -7,7 +7,7 @@ import numpy as np
 
 from ...identification import Unknown, prior
 from ...structures import is_offset
-from .._trial import Trial, ended, own_values
+from .fitted import Trial, ended, own_values
 
 _HARDLY_TRUSTED = math.log(2.0)
 """Width of an own value's prior from which it may be nothing: its owner trusts it to the whole of itself."""

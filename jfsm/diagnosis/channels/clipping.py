@@ -1,0 +1,45 @@
+"""Channels that their recorder limited: seen in the record itself, before anything is fitted."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...identification import LEAST_SAMPLES
+from ...records import Record, defects
+from ...structures import Clipping, Structure, causes
+from .._diagnosis import Estimate, Finding
+from ..report.law_class import class_of
+
+PROBABILITY = 0.99
+"""That samples at one level are clipped ones: noise does not come back to a level by itself."""
+_NOTICEABLE = 0.002
+"""Share of a channel's samples, from which clipping is a finding."""
+_SAME = 1e-9
+"""Rounding, relative."""
+
+
+def limited(records: Sequence[Record], model: Structure) -> list[Clipping]:
+    """The clipped channels of which the model knows nothing, with their limits; those cut off alike on both sides.
+
+    Where a motion is imposed none is told: friction alone may hold the force at one level, and a rig its motion. Nor is
+    any of a record that is too short to be fitted.
+    """
+    known = {s.at for s in model.sensors if isinstance(s, Clipping)}
+    found: dict[tuple[str, int], float] = {}
+    for record in (r for r in records if r.drive == "force" and len(r) >= LEAST_SAMPLES):
+        for channel, samples in record.channels.items():
+            cut, torn = defects(samples, record.dt)
+            size = float(np.max(np.abs(samples[~torn])))
+            there = np.abs(samples[cut])
+            if channel not in known and cut.mean() > _NOTICEABLE and np.all(there >= size * (1 - _SAME)):
+                found[channel] = max(size, found.get(channel, 0.0))
+    return [Clipping(limit, at=channel) for channel, limit in found.items()]
+
+
+def finding(sensor: Clipping, unit: str) -> Finding:
+    """A clipped channel as a finding."""
+    limit, cause = sensor.value, causes()["clipping"]
+    estimate = Estimate(limit, limit * (1 - _SAME), limit * (1 + _SAME), unit)
+    values = {"limit": estimate}
+    kind = class_of(cause, sensor)
+    return Finding(cause.id, cause.family, sensor.at, PROBABILITY, values, (), cause.sentence, kind, PROBABILITY)

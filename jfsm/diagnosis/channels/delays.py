@@ -1,0 +1,109 @@
+"""Channels that are late by less than a sample, as every sensor may be: no finding, but time that is put right."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...identification import Nuisances
+from ...records import Record, advanced
+from ...structures import ChannelDelay, ForceDelay, Structure
+from ..evidence.fitted import Trial
+from ..evidence.setup import Problem
+from ..evidence.split import HeldOut
+from ..thresholds import THRESHOLDS
+
+_DELAYS = (ForceDelay, ChannelDelay)
+Late = Mapping[tuple[str, int], float]
+"""How late channels are, by (kind, degree of freedom) [s]."""
+_STEP = 0.25
+"""Samples by which a channel is read earlier and later."""
+_FARTHER = 4.0
+"""Times what a parabola about no delay tells that a longer one may gain."""
+
+
+def slightly_late(trials: Sequence[Trial], known: Late, dt: float) -> Late:
+    """How late channels are by the likeliest trial, on top of what is `known`; that alone where nothing is new.
+
+    Each is so by less than a sample, and the same trial with all channels in time is far less likely.
+    """
+    best = max(trials, key=lambda t: t.evidence)
+    delays = [part for part in best.parts if isinstance(part, _DELAYS)]
+    slight = all(abs(part.tau) < dt for part in delays)
+    more = {part.at: known.get(part.at, 0.0) + float(part.tau) for part in delays}
+    rest = tuple(effect for effect in best.effects if not issubclass(effect.cause.effect, _DELAYS))
+    without = max((t.evidence for t in trials if t.effects == rest), default=-math.inf)
+    return {**known, **more} if delays and slight and best.evidence > without + THRESHOLDS.significant else known
+
+
+def seems_late(beside: Trial, problem: Problem) -> ChannelDelay | None:
+    """The delay, of less than a sample, of a channel that would have been far likelier beside a trial in time, if any.
+
+    The trial's numbers stay: a parabola through what it is worth a quarter of a sample earlier and later.
+    """
+    if problem.imposed:
+        return None
+    now, found = _cost(beside, problem), dict[tuple[str, int], tuple[float, float]]()
+    for c, channel in enumerate(problem.first.channels):
+        earlier, later = (_cost(beside, _read_later(problem, c, samples)) for samples in (-_STEP, _STEP))
+        slope, curvature = (later - earlier) / 2, later + earlier - 2 * now
+        if curvature > 0 and abs(slope) * _STEP < curvature:
+            found[channel] = slope**2 / (2 * curvature), -slope / curvature * _STEP
+    most = max(found, key=lambda channel: found[channel], default=None)
+    if most is None or found[most][0] < THRESHOLDS.searched:
+        return None
+    return ChannelDelay(found[most][1] * problem.first.record.dt, at=most)
+
+
+def gain_of_delay(beside: Trial, channel: tuple[str, int], problem: Problem) -> float:
+    """Nats that a trial would gain at most, as far as a parabola tells, were a channel late; infinite where none does.
+
+    A delay of several samples may gain more than the parabola about none, but not many times more.
+    """
+    if problem.imposed:
+        return math.inf
+    c, now = problem.first.channels.index(channel), _cost(beside, problem)
+    earlier, later = (_cost(beside, _read_later(problem, c, samples)) for samples in (-_STEP, _STEP))
+    slope, curvature = (later - earlier) / 2, later + earlier - 2 * now
+    return _FARTHER * slope**2 / (2 * curvature) if curvature > 0 else math.inf
+
+
+def _cost(t: Trial, problem: Problem) -> float:
+    return float(problem.posterior_of(t).values(t.theta[None])[0])
+
+
+def _read_later(problem: Problem, c: int, samples: float) -> Problem:
+    """The same problem, a channel of its records read so many samples later."""
+
+    def moved(nuisances: Nuisances) -> Nuisances:
+        values = np.array(nuisances.readings.values)[: nuisances.samples]
+        values[:, c] = advanced(values[:, c], samples, nuisances.record.dt)
+        return nuisances.showing(values)
+
+    return problem._replace(records=[moved(nuisances) for nuisances in problem.records])
+
+
+def in_time(
+    training: Sequence[tuple[Record, int]], held: Sequence[HeldOut], late: Late
+) -> tuple[list[tuple[Record, int]], list[HeldOut]]:
+    """What is fitted, and what is held out, with channels in time that are known to be late."""
+    if not late:
+        return list(training), list(held)
+
+    def said(record: Record) -> list[str]:
+        samples = {channel: tau / record.dt for channel, tau in late.items()}
+        return [
+            f"{kind} {j} seems late by {much:.2g} of a sample; so much is taken for the sensor's."
+            for (kind, j), much in samples.items()
+        ]
+
+    fitted = [(record.aligned(late).noted(*said(record)), until) for record, until in training]
+    return fitted, [replace(part, record=part.record.aligned(late)) for part in held]
+
+
+def showing_late(structure: Structure, late: Late) -> Structure:
+    """The structure, as it shows in channels that are so late."""
+    for (kind, j), tau in late.items():
+        structure = structure + (ForceDelay(tau, at=(kind, j)) if kind == "force" else ChannelDelay(tau, at=(kind, j)))
+    return structure
