@@ -13,7 +13,7 @@ from jfsm.diagnosis.evidence.fitted import Trial
 from jfsm.diagnosis.evidence.free_runs import BASE, remeasured
 from jfsm.diagnosis.evidence.noise_draws import beside_chance, noise_beyond
 from jfsm.diagnosis.evidence.setup import Problem
-from jfsm.diagnosis.search.searches import fit_model
+from jfsm.diagnosis.search.baseline import fit_model
 from jfsm.diagnosis.thresholds import THRESHOLDS
 from jfsm.identification import prepare_all
 from jfsm.structures import Coulomb

@@ -450,7 +450,7 @@ def test_where_no_law_fits_those_are_fitted_too_that_explain_less_of_the_missing
         left_out = [c for c in tried if c.effects[0].cause.id == "cubic_hardening"]
         return [c for c in tried if c not in left_out], left_out
 
-    monkeypatch.setattr("jfsm.diagnosis.search.study.promising", last)
+    monkeypatch.setattr("jfsm.diagnosis.search.rounds.promising", last)
     causes = ("cubic_hardening", "quadratic_damping", "coulomb")
     d = jfsm.diagnose(made(duffing), believed, causes=causes, max_causes=1, key=jax.random.key(0))
     assert [f.cause for f in d.findings] == ["cubic_hardening"]

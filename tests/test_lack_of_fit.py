@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 import jfsm
 from jfsm.diagnosis.evidence.lack_of_fit import LackOfFit
 from jfsm.diagnosis.evidence.setup import Problem
-from jfsm.diagnosis.search.searches import fit_model
+from jfsm.diagnosis.search.baseline import fit_model
 from jfsm.identification import prepare_all
 from jfsm.structures import CubicStiffness
 

@@ -21,15 +21,12 @@ from jfsm.diagnosis.hypotheses.candidates import (
 )
 from jfsm.diagnosis.hypotheses.effect import Effect
 from jfsm.diagnosis.hypotheses.initial_values import Begin, Start, begun
-from jfsm.diagnosis.search import searches
+from jfsm.diagnosis.search import batches
+from jfsm.diagnosis.search.baseline import fit_model, refit_from
+from jfsm.diagnosis.search.batches import Found, LeftBehind, groups
 from jfsm.diagnosis.search.pairs import crossed, instead, pairs
 from jfsm.diagnosis.search.related_laws import beside_a_spring, instead_of, late_instead, special_cases
 from jfsm.diagnosis.search.searches import (
-    Found,
-    LeftBehind,
-    fit_model,
-    groups,
-    refit_from,
     search,
     search_again,
     search_akin,
@@ -430,11 +427,11 @@ def test_starts_that_begin_best_where_more_or_less_is_forgiven_both_climb(monkey
         Start({0.03: 1.0, 0.01: 3.0}, -4.0),
     ]
     monkeypatch.setattr(
-        searches,
+        batches,
         "rungs",
         lambda start, ladder, limit: (SimpleNamespace(value=np.array([start.top * share])) for share in (0.1, 1.0)),
     )
-    lot = object.__new__(searches._Lot)
+    lot = object.__new__(batches.Batch)
     lot.limit = UNLIMITED
     stood = list(lot._climb(starts, ("first", "second", "third"), 1, (0.1, 0.03, 0.01)))  # pyright: ignore
     assert [float(found.value[0]) for found in stood] == [-0.5, -5.0]

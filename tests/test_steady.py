@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 import jfsm
 from jfsm.diagnosis.channels.stationarity import unsteady
 from jfsm.diagnosis.evidence.setup import Problem
-from jfsm.diagnosis.search.searches import fit_model
+from jfsm.diagnosis.search.baseline import fit_model
 from jfsm.identification import prepare_all
 
 N, DT = 3000, 0.05

@@ -26,8 +26,9 @@ from .evidence.split import HeldOut, split
 from .hypotheses.candidates import Candidate, chosen_causes
 from .report.findings import Reached, Tested, assemble
 from .report.unfinished import Unfinished
+from .search.rounds import Searched
 from .search.steps import Progress, Steps
-from .search.study import Searched, Study
+from .search.study import Study
 from .verdict.judge import judge
 
 _ROUNDS = 3

@@ -9,8 +9,8 @@ import jax
 
 from ...structures import Clipping, Structure
 from ..hypotheses.effect import key_of
-from ..search.searches import LeftBehind
-from ..search.study import Searched
+from ..search.batches import LeftBehind
+from ..search.rounds import Searched
 from ..verdict.decision import Decision
 from .evidence import Evidence, Measure, SetAside, Setting, has_map, map_on
 from .fitted import Trial

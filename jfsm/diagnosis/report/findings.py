@@ -29,7 +29,7 @@ from ..evidence.scorecard import GIVEN
 from ..evidence.setup import Problem
 from ..hypotheses.candidates import Candidate
 from ..hypotheses.effect import Effect, key_of, names, places
-from ..search.searches import LeftBehind
+from ..search.batches import LeftBehind
 from ..thresholds import THRESHOLDS
 from ..verdict.decision import Decision
 from .force_shape import Shape, shape_of

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from ..._limit import Limit
 from ...structures import Cause
-from ..search.study import Searched
+from ..search.rounds import Searched
 
 _LISTED = 8
 """Causes that are listed in words, at most; the numbers hold all of them."""

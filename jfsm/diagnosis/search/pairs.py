@@ -56,15 +56,9 @@ def pairs(
 ) -> list[Candidate]:
     """Pairs to be tried, from what single causes explain and what they leave; what is `known` to act before others."""
     found: list[_Pair] = []
-    families: list[str] = []
-    surely = () if known is None else known.effects
-    for base in sorted(singles, key=lambda t: (t.effects != surely, bool(at_bounds(t)), -t.evidence)):
-        family = base.effects[0].cause.family
-        if family in families or len(families) == _BASES:
-            continue
-        families.append(family)
+    for rank, base in enumerate(_bases(singles, known)):
         beside = _beside(base, 0, effects, problem)
-        if len(families) <= _WITH_UNTOLD:
+        if rank < _WITH_UNTOLD:
             found += [pair for pair in beside if pair.promise is None]
         found += _best(beside, _BESIDE)
     untold = [pair.candidate for pair in found if pair.promise is None]
@@ -73,11 +67,19 @@ def pairs(
     return tried + [c for c in _together(effects, problem) if c.effects not in done]
 
 
+def _bases(singles: Sequence[Trial], known: Trial | None) -> list[Trial]:
+    """The best single cause of each family, the best family first; those with own values at a bound come last."""
+    surely = () if known is None else known.effects
+    best: dict[str, Trial] = {}
+    for t in sorted(singles, key=lambda t: (t.effects != surely, bool(at_bounds(t)), -t.evidence)):
+        best.setdefault(t.effects[0].cause.family, t)
+    return list(best.values())[:_BASES]
+
+
 def _together(effects: Sequence[Effect], problem: Problem) -> list[Candidate]:
     """Pairs of laws that together explain most of what the model lacks, the best of each two families."""
     laws = [effect for effect in effects if not effect.cause.is_sensor]
-    in_order = [(i, j) if _in_order(laws[i], laws[j]) else (j, i) for i, j in combinations(range(len(laws)), 2)]
-    allowed = [(i, j) for i, j in in_order if _are_two(laws[i], laws[j])]
+    allowed = _allowed(laws)
     found: dict[tuple, Candidate] = {}
     for placed in Laws(problem.model, problem.first).together(laws, allowed):
         pair = tuple(laws[i] for i in placed.laws)
@@ -87,6 +89,12 @@ def _together(effects: Sequence[Effect], problem: Problem) -> list[Candidate]:
         if len(found) == _TOGETHER:
             break
     return list(found.values())
+
+
+def _allowed(laws: Sequence[Effect]) -> list[tuple[int, int]]:
+    """Indices of two laws that are two effects, in their order."""
+    couples = [(i, j) if _in_order(laws[i], laws[j]) else (j, i) for i, j in combinations(range(len(laws)), 2)]
+    return [(i, j) for i, j in couples if _are_two(laws[i], laws[j])]
 
 
 def instead(pair: Trial, effects: Sequence[Effect], problem: Problem) -> list[Candidate]:
@@ -133,34 +141,48 @@ def _best(found: Sequence[_Pair], most: int) -> list[_Pair]:
 
 def _beside(base: Trial, kept: int, effects: Sequence[Effect], problem: Problem) -> list[_Pair]:
     """Pairs of one effect of a trial with every other, instead of the trial's second if it has two."""
-    model, effect, part = problem.model, base.effects[kept], base.parts[kept]
-    changed = base.parts[1 - kept] if len(base.parts) > 1 else None
-    structure = base.structure if changed is None else base.structure.without(changed)
-    laws, others = Laws(structure, problem.first), [part] if isinstance(part, AbstractTerm) else []
-    begin = found_in(base)
+    effect, part = base.effects[kept], base.parts[kept]
     found: list[_Pair] = []
     to_place: list[Effect] = []
-    for other in effects:
-        if not _are_two(effect, other):
-            continue
-        constant = _instead_of_an_offset(base, other)
-        if constant is not None:
-            found.append(_Pair(joined(model, effect, part, other, [constant], begin), None))
-        elif other.cause.is_sensor:
-            # A gain lies on a ridge with the own values: it begins at those as given, and at their end of it.
-            starts = natural_starts(model + part, *other, problem.first)
-            found.append(_Pair(Candidate(_ordered(effect, other), starts), None))
-        else:
+    for other in (other for other in effects if _are_two(effect, other)):
+        unplaced = _without_a_shape(base, effect, part, other, problem)
+        if unplaced is None:
             to_place.append(other)
-    shapes_of = list(side_by_side(lambda other: laws.placed(other, others), to_place))
-    placed = [(other, shapes) for other, shapes in zip(to_place, shapes_of, strict=True) if shapes]
-    ranked = promised(base, changed, laws, [shapes for _, shapes in placed], problem)
-    for (other, _), best in zip(placed, ranked, strict=True):
+        else:
+            found.append(_Pair(unplaced, None))
+    return found + _placed(base, kept, to_place, problem)
+
+
+def _placed(base: Trial, kept: int, others: Sequence[Effect], problem: Problem) -> list[_Pair]:
+    """Pairs of one effect of a trial with laws of shapes that regression places, each with what it promises."""
+    effect, part = base.effects[kept], base.parts[kept]
+    changed = base.parts[1 - kept] if len(base.parts) > 1 else None
+    structure = base.structure if changed is None else base.structure.without(changed)
+    laws, known = Laws(structure, problem.first), [part] if isinstance(part, AbstractTerm) else []
+    shapes_of = side_by_side(lambda other: laws.placed(other, known), others)
+    placed = {other: shapes for other, shapes in zip(others, shapes_of, strict=True) if shapes}
+    ranked = promised(base, changed, laws, list(placed.values()), problem)
+    found: list[_Pair] = []
+    for other, best in zip(placed, ranked, strict=True):
         terms = [shape.term for shape, _ in best[:SHAPES]] + laws.natural(other)
         shape, most = best[0]
-        promise = None if shape.share is None else most
-        found.append(_Pair(joined(model, effect, part, other, terms[:SHAPES], begin), promise))
+        candidate = joined(problem.model, effect, part, other, terms[:SHAPES], found_in(base))
+        found.append(_Pair(candidate, None if shape.share is None else most))
     return found
+
+
+def _without_a_shape(
+    base: Trial, effect: Effect, part: AbstractTerm | AbstractSensor, other: Effect, problem: Problem
+) -> Candidate | None:
+    """An effect and a second one that no regression places: what takes over an offset, or a sensor's fault."""
+    constant = _instead_of_an_offset(base, other)
+    if constant is not None:
+        return joined(problem.model, effect, part, other, [constant], found_in(base))
+    if other.cause.is_sensor:
+        # A gain lies on a ridge with the own values: it begins at those as given, and at their end of it.
+        starts = natural_starts(problem.model + part, *other, problem.first)
+        return Candidate(_ordered(effect, other), starts)
+    return None
 
 
 def _instead_of_an_offset(base: Trial, other: Effect) -> AbstractTerm | AbstractSensor | None:

@@ -58,20 +58,26 @@ def instead_of(
 
     None along an imposed motion, of which there are no innovations.
     """
-    there = dict.fromkeys(c.effects[0] for c in among if len(c.effects) == 1 and c.effects[0].at == law.at)
-    wider = [effect for effect in there if effect in close or type(law) in effect.cause.effect.contains]
-    if not wider or problem.imposed:
+    wider = [] if problem.imposed else _wider(law, among, close)
+    if not wider:
         return []
     laws = Laws(t.structure.without(law), problem.first)
-    placed = [(effect, shapes) for effect in wider if (shapes := laws.placed(effect) + laws.holding(effect, law))]
+    shapes_of = {effect: laws.placed(effect) + laws.holding(effect, law) for effect in wider}
+    placed = {effect: shapes for effect, shapes in shapes_of.items() if shapes}
     cases, begin = [], found_in(t)
-    for (effect, _), best in zip(placed, promised(t, law, laws, [s for _, s in placed], problem), strict=True):
+    for effect, best in zip(placed, promised(t, law, laws, list(placed.values()), problem), strict=True):
         # What comes close has been at a top of its own: to promise more than that, before its numbers move, is much.
         least = close.get(effect, t.evidence + THRESHOLDS.significant)
         if best[0][1] > least or (effect not in close and not is_noise_only(t)):
             starts = tuple(problem.model + shape.term for shape, _ in best[:SHAPES])
             cases.append(Candidate((effect,), starts, begin=begin))
     return cases
+
+
+def _wider(law: AbstractTerm, among: Sequence[Candidate], close: Mapping[Effect, float]) -> list[Effect]:
+    """Laws at its place that hold it as a special case, or that come close."""
+    there = dict.fromkeys(c.effects[0] for c in among if len(c.effects) == 1 and c.effects[0].at == law.at)
+    return [effect for effect in there if effect in close or type(law) in effect.cause.effect.contains]
 
 
 def late_instead(
