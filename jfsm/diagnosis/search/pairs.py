@@ -1,7 +1,7 @@
 """Two effects at once, where one leaves something: not the best one and then the next, but pairs of good ones."""
 
 from collections.abc import Sequence
-from itertools import combinations, product
+from itertools import chain, combinations, product
 from typing import NamedTuple
 
 from ..._threads import side_by_side
@@ -55,14 +55,10 @@ def pairs(
     problem: Problem,
 ) -> list[Candidate]:
     """Pairs to be tried, from what single causes explain and what they leave; what is `known` to act before others."""
-    found: list[_Pair] = []
-    for rank, base in enumerate(_bases(singles, known)):
-        beside = _beside(base, 0, effects, problem)
-        if rank < _WITH_UNTOLD:
-            found += [pair for pair in beside if pair.promise is None]
-        found += _best(beside, _BESIDE)
-    untold = [pair.candidate for pair in found if pair.promise is None]
-    tried = untold + [pair.candidate for pair in _best(found, _PAIRS)]
+    beside = [_beside(base, 0, effects, problem) for base in _bases(singles, known)]
+    unplaced = [pair for pair in chain(*beside[:_WITH_UNTOLD]) if pair.promise is None]
+    promising = _best([*chain(*(_best(of_one, _BESIDE) for of_one in beside))], _PAIRS)
+    tried = [pair.candidate for pair in (*unplaced, *promising)]
     done = {candidate.effects for candidate in tried}
     return tried + [c for c in _together(effects, problem) if c.effects not in done]
 

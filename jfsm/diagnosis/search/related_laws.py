@@ -59,11 +59,10 @@ def instead_of(
     None along an imposed motion, of which there are no innovations.
     """
     wider = [] if problem.imposed else _wider(law, among, close)
-    if not wider:
-        return []
     laws = Laws(t.structure.without(law), problem.first)
-    shapes_of = {effect: laws.placed(effect) + laws.holding(effect, law) for effect in wider}
-    placed = {effect: shapes for effect, shapes in shapes_of.items() if shapes}
+    placed = {effect: shapes for effect in wider if (shapes := laws.placed(effect) + laws.holding(effect, law))}
+    if not placed:
+        return []
     cases, begin = [], found_in(t)
     for effect, best in zip(placed, promised(t, law, laws, list(placed.values()), problem), strict=True):
         # What comes close has been at a top of its own: to promise more than that, before its numbers move, is much.

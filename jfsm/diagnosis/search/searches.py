@@ -90,21 +90,27 @@ def _akin_to(t: Trial, every: Sequence[Candidate], problem: Problem) -> list[Can
 
 def _in_place_of(close: Sequence[Trial], every: Sequence[Candidate], known: Found, problem: Problem) -> list[Candidate]:
     """What is less probable so far than a law that it may take the place of."""
-    evidence, tried = {t.effects: t.evidence for t in known.trials}, list[Candidate]()
-    ranked = sorted(close if any(map(is_noise_only, close)) else known.trials, key=lambda t: -t.evidence)
+    evidence = dict.fromkeys((c.effects for c in every), -math.inf) | {t.effects: t.evidence for t in known.trials}
+    tried = list[Candidate]()
+    ranked = _ranked(close if any(map(is_noise_only, close)) else known.trials)
     near = _close_to(ranked[0], known.trials) if ranked else {}
     for t in ranked:
-        done = {c.effects for c in tried}
-        behind = [c for c in every if c.effects not in done and evidence.get(c.effects, -math.inf) < t.evidence]
-        tried += [c for law in t.laws for c in instead_of(t, law, behind, near, problem)]
-        near = {}
+        behind = [c for c in every if evidence[c.effects] < t.evidence]
+        new = [c for law in t.laws for c in instead_of(t, law, behind, near, problem)]
+        evidence |= dict.fromkeys((c.effects for c in new), math.inf)  # tried once
+        tried, near = tried + new, {}
     return tried
+
+
+def _ranked(trials: Sequence[Trial]) -> list[Trial]:
+    """The most probable first."""
+    return sorted(trials, key=lambda t: -t.evidence)
 
 
 def _close_to(leader: Trial, trials: Sequence[Trial]) -> dict[Effect, float]:
     """Single effects that come closest to a trial, and their evidence."""
     close = [t for t in trials if len(t.effects) == 1 and 0 < leader.evidence - t.evidence < _CLOSE]
-    return {t.effects[0]: t.evidence for t in sorted(close, key=lambda t: -t.evidence)[:_AGAIN]}
+    return {t.effects[0]: t.evidence for t in _ranked(close)[:_AGAIN]}
 
 
 def search_again(found: Sequence[Trial], refitted: Trial, problem: Problem, tell: Tell) -> Found:
@@ -117,19 +123,24 @@ def search_again(found: Sequence[Trial], refitted: Trial, problem: Problem, tell
 def _worth_a_second_fit(found: Sequence[Trial]) -> list[Trial]:
     """Of single effects and of pairs the most probable and those that predict best, and the effects of such pairs one
     by one. Once the most probable leaves noise only, those far behind it are not among them."""
-    leader = max(found, key=lambda t: t.evidence, default=None)
-    if leader is not None and is_noise_only(leader):
-        found = [t for t in found if leader.evidence - t.evidence < _CLOSE]
-    best = {t.effects: t for count in (1, 2) for t in _leaders([t for t in found if len(t.effects) == count])}
-    parts = {(effect,) for effects in best if len(effects) > 1 for effect in effects}
-    best |= {t.effects: t for t in found if t.effects in parts}
-    return list(best.values())
+    ranked = _in_the_running(found)
+    singles, both = ([t for t in ranked if len(t.effects) == count] for count in (1, 2))
+    best = {t.effects: t for t in (*_leaders(singles), *_leaders(both))}
+    parts = {(effect,) for effects in best for effect in effects}
+    return [*best.values(), *(t for t in singles if t.effects in parts and t.effects not in best)]
+
+
+def _in_the_running(found: Sequence[Trial]) -> list[Trial]:
+    """The most probable first, without those far behind one that leaves noise only."""
+    ranked = _ranked(found)
+    if not ranked or not is_noise_only(ranked[0]):
+        return ranked
+    return [t for t in ranked if ranked[0].evidence - t.evidence < _CLOSE]
 
 
 def _leaders(found: Sequence[Trial]) -> list[Trial]:
-    """The most probable, and those that predict best."""
-    likely = sorted(found, key=lambda t: -t.evidence)[:_AGAIN]
-    return likely + sorted(found, key=lambda t: float(np.sum(t.prediction.error)))[:_AGAIN]
+    """Of trials in the order of their evidence the most probable, and those that predict best."""
+    return [*found[:_AGAIN], *sorted(found, key=lambda t: float(np.sum(t.prediction.error)))[:_AGAIN]]
 
 
 def search_known(found: Trial, others: Found, problem: Problem, tell: Tell) -> Found:
