@@ -8,7 +8,7 @@ from .bench import Bench, shown
 from .checks import Check
 from .decision import MODEL, Decision
 from .ranking import is_sure_of, rank
-from .right_shape import doubt, settle_shape
+from .right_shape import doubt, first_failed, settle_shape
 
 _DECIDING = ("map_adds_little", "visible_in_prediction", "better_than_given")
 """Checks that decide for a map or the model as given whatever else is likely."""
@@ -213,12 +213,13 @@ class _Judgement:
         bench, of = self.bench, [winner.key]
         far, checks = doubt(winner, winner.evidence - bench.given.evidence, bench)
         bench.less_sure(of, "other shapes would gain beside it", 1.0 - 0.5 * min(far, 1.0))
-        if far > 1.0:
+        failed = first_failed(checks)
+        if failed is not None:
             bench.less_sure(of, "it is refused", 0.0)
         row = self._probability_of(winner)
         if row.passed:
             return "parameters"
-        bench.stop(next((check for check in checks if not check.passed), row))
+        bench.stop(failed or row)
         return "undecided"
 
     def _probability_of(self, winner: Scorecard) -> Check:

@@ -16,9 +16,10 @@ _UNSEEN = "are two laws of which predictions show nothing, and may stand for one
 
 
 def doubt(card: Scorecard, gained: float, bench: Bench, *, shapeless: bool = False) -> tuple[float, list[Check]]:
-    """How far other shapes speak against a hypothesis whose last effect gained so many nats: above 1, too far.
+    """How far other shapes speak against a hypothesis whose last effect gained so many nats, and the checks that were
+    made: above 1, too far, one of them fails.
 
-    With `shapeless` the share of the innovations that they explain is not asked. Beside it the checks that were made.
+    With `shapeless` the share of the innovations that they explain is not asked.
     """
     limits, shapes = bench.limits, bench.evidence.other_shapes(card.key)
     white = bench.white(card)
@@ -54,13 +55,19 @@ def settle_shape(winner: Scorecard, bench: Bench) -> Settled:
     if against is not None:
         bench.refuse(found.key, against.says)
         return Settled(found, against)
-    if far <= 1.0:
+    failed = first_failed(checks)
+    if failed is None:
         return Settled(found, None)
     near = _nearest(found, bench)
     bench.reasons[found.key] = WRONG_SHAPE
     if near is None:
         bench.refuse(found.key, WRONG_SHAPE)
-    return Settled(found, next(check for check in checks if not check.passed), near)
+    return Settled(found, failed, near)
+
+
+def first_failed(checks: Sequence[Check]) -> Check | None:
+    """The first check that does not pass, if there is one."""
+    return next((check for check in checks if not check.passed), None)
 
 
 def _of_right_shape(winner: Scorecard, bench: Bench) -> tuple[Scorecard, float, list[Check]]:
@@ -69,11 +76,11 @@ def _of_right_shape(winner: Scorecard, bench: Bench) -> tuple[Scorecard, float, 
     Predictions that all leave something hardly tell one law from another of its family.
     """
     far, checks = _doubt_of(winner, winner, bench)
-    if far <= 1.0 or bench.noise_only(winner):
+    if first_failed(checks) is None or bench.noise_only(winner):
         return winner, far, checks
     for card in _alike(winner, bench):
         other, checked = _doubt_of(card, winner, bench)
-        if other <= 1.0:
+        if first_failed(checked) is None:
             bench.refuse(winner.key, WRONG_SHAPE)
             bench.reasons[card.key] = ""
             return card, other, checked
