@@ -624,12 +624,11 @@ ROWS = [
         f"cause {FRICTION}", f"cause {FRICTION}?", plus=1.0),
     # Sufficient
     *(
-        Row(name, number, "<", evidence_of(refit(1000.0, power, **{"whiteness": 0.05} | more), maps={REFITTED: 0.0}),
+        Row("leaves_only_noise", number, "<",
+            evidence_of(refit(1000.0, power, **{"whiteness": 0.05} | more), maps={REFITTED: 0.0}),
             "parameters refitted", f"unnamed {map_on(REFITTED)}")
-        for name, number, power, more in (
-            ("innovations_are_white", "white", 3e-4, {"whiteness": 0.09}),
-            ("noise_is_the_floor", "noise_scale", 3e-4, {"noise_scale": 0.4}),
-            ("leaves_little", "negligible", 3e-4, {}),
+        for number, power, more in (
+            ("white", 1e-4, {"whiteness": 0.09}), ("noise_scale", 1e-4, {"noise_scale": 0.4}), ("negligible", 3e-4, {})
         )
     ),
     Row("map_adds_little", "half", "<", evidence_of(card(9000.0, 0.002, "coulomb"), maps={FRICTION: 9e-4}),
@@ -770,7 +769,7 @@ NOT_ONLY_NOISE = evidence_of(given(0.0, 0.0), refit(-5.0, 0.0), shapes=50.0)
         ("unnamed", map_on(REFITTED), None, None, evidence_of(maps={REFITTED: 0.001})),
         ("unnamed", map_on(REFITTED), None, None, evidence_of(RIGHT, shapes=5000.0, maps={REFITTED: 0.001})),
         ("undecided", REFITTED, None, "values_leave_little", evidence_of()),
-        ("undecided", GIVEN, None, "leaves_little", evidence_of(refit(-5.0, 0.5))),
+        ("undecided", GIVEN, None, "leaves_only_noise", evidence_of(refit(-5.0, 0.5))),
         ("undecided", REFITTED, None, "explains_nearly_all", evidence_of(card(9000.0, 0.03, "coulomb"))),
         ("undecided", REFITTED, None, "probability", evidence_of(WRONG, card(9000.0, 0.002, "cubic_hardening"))),
         ("undecided", REFITTED, None, "right_shape", evidence_of(RIGHT, shapes=5000.0)),

@@ -186,26 +186,13 @@ CHECKS: Mapping[str, Kind] = {
         "The numbers of its law are the same in all records; else it is half as sure.",
         ("differs",),
     ),
-    "innovations_are_white": Kind(
+    "leaves_only_noise": Kind(
         "sufficient",
         "<",
-        "correlation",
-        "What it leaves does not correlate from sample to sample.",
-        ("white",),
-    ),
-    "noise_is_the_floor": Kind(
-        "sufficient",
-        "<",
-        "log of a ratio",
-        "What it leaves is as large as the noise floor of the channels.",
-        ("noise_scale",),
-    ),
-    "leaves_little": Kind(
-        "sufficient",
-        "<",
-        "share of the signal",
-        "Its predictions leave nothing beyond noise.",
-        ("negligible", "chance"),
+        "correlation, log of a ratio, or share of the signal",
+        "What it leaves does not correlate from sample to sample, is as large as the noise floor of the channels, and "
+        "shows in no prediction. The row has what is furthest from its limit.",
+        ("white", "noise_scale", "negligible", "chance"),
     ),
     "map_adds_little": Kind(
         "sufficient",
@@ -316,8 +303,8 @@ CHECKS: Mapping[str, Kind] = {
 _HOLDS = {">=": ge, "<=": le, ">": gt, "<": lt}
 
 
-def checked(name: str, of: str, measured: float, limit: float, says: str) -> Check:
-    """The outcome of a check of `CHECKS`, of the hypothesis with the key `of`."""
+def checked(name: str, of: str, measured: float, limit: float, says: str, unit: str | None = None) -> Check:
+    """The outcome of a check of `CHECKS`, of the hypothesis with the key `of`, in the check's unit or another one."""
     kind = CHECKS[name]
     passed = bool(_HOLDS[kind.relation](measured, limit))
-    return Check(kind.stage, name, of, float(measured), kind.relation, float(limit), kind.unit, passed, says)
+    return Check(kind.stage, name, of, float(measured), kind.relation, float(limit), unit or kind.unit, passed, says)
