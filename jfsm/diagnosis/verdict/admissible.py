@@ -236,7 +236,7 @@ def _holds_without_time(card: Scorecard, bench: Bench) -> Reason:
     if not bench.evidence.setting.model_error or not card.timed:
         return ""
     says = "depends on time, and no second record shows the same"
-    bench.check("shown_by_a_second_record", card.key, 0, 0, says)
+    bench.check("identifiable_here", card.key, 1, 0, says)
     return says
 
 
@@ -244,7 +244,7 @@ def _takes_the_drives_place(card: Scorecard, bench: Bench) -> Reason:
     if not card.in_step:
         return ""
     says = "takes the place of a noisy drive, with which it is in step"
-    bench.check("out_of_step_with_drive", card.key, 1, 0, says)
+    bench.check("identifiable_here", card.key, 1, 0, says)
     return says
 
 

@@ -146,17 +146,13 @@ CHECKS: Mapping[str, Kind] = {
         "Beside it no offset of an accelerometer is so large that it is a bias.",
         ("bias",),
     ),
-    "shown_by_a_second_record": Kind(
-        "admissible",
-        ">",
-        "records that show the same",
-        "Where a model error is admitted, a change with time is shown by a second record.",
-    ),
-    "out_of_step_with_drive": Kind(
+    "identifiable_here": Kind(
         "admissible",
         "<=",
-        "loads of the drive's line",
-        "It is no load of the single line that drives the structure, which takes the place of the noisy drive.",
+        "reasons why not",
+        "These records can show it: no change with time in a single decay, nor by one record where a model error is "
+        "admitted; no load in step with a single line that drives the structure; no two laws where predictions of the "
+        "refitted model show nothing.",
     ),
     "no_simpler_law_as_good": Kind(
         "named",
@@ -243,18 +239,6 @@ CHECKS: Mapping[str, Kind] = {
         "share of the innovations' power",
         "Forces of other shapes would not explain half of what it leaves.",
         ("rest_with_shape",),
-    ),
-    "identifiable_here": Kind(
-        "sufficient",
-        "<=",
-        "reasons why not",
-        "These records can show it: not a change with time in a single decay, nor a load in step with a single line.",
-    ),
-    "two_laws_are_seen": Kind(
-        "sufficient",
-        ">",
-        "sets of samples that show them",
-        "Predictions of the refitted model show something, if two laws are to be named.",
     ),
     "not_worse": Kind(
         "confirmed",

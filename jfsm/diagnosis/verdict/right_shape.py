@@ -138,4 +138,4 @@ def _both_unseen(card: Scorecard, bench: Bench) -> Check | None:
     laws = [law for law in card.laws if law.role != CONSTANT_FORCE]
     if len(laws) < 2 or bench.shows(bench.refitted):
         return None
-    return bench.check("two_laws_are_seen", card.key, 0, 0, _UNSEEN)
+    return bench.check("identifiable_here", card.key, 1, 0, _UNSEEN)
