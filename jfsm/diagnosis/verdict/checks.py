@@ -115,7 +115,8 @@ CHECKS: Mapping[str, Kind] = {
         "admissible",
         ">=",
         "share of excess power",
-        "It explains half of the error power that the refitted model leaves beyond noise, on every set of samples.",
+        "It explains half of the error power that the refitted model leaves beyond noise, on every set of samples; own "
+        "values that leave more than noise, half of what the model as given leaves.",
         ("half", "noticeable", "chance"),
     ),
     "second_effect_pays": Kind(
@@ -204,18 +205,11 @@ CHECKS: Mapping[str, Kind] = {
         "If it leaves much of the signal, it explains nearly all of the rest: else it is only the nearest law.",
         ("nearly_all", "much"),
     ),
-    "values_explain_half": Kind(
-        "sufficient",
-        ">=",
-        "share of excess power",
-        "Own values that leave more than noise explain half of what the model as given leaves.",
-        ("half",),
-    ),
     "values_leave_little": Kind(
         "sufficient",
         "<",
         "share of the signal",
-        "And their predictions leave less than twice what is negligible.",
+        "Own values that leave more than noise leave less than twice what is negligible.",
         ("negligible",),
     ),
     "right_shape": Kind(
@@ -264,14 +258,8 @@ CHECKS: Mapping[str, Kind] = {
         "confirmed",
         ">=",
         "share of held-out error",
-        "A map, or what only a long run shows, closes half of the held-out error.",
-        ("half",),
-    ),
-    "may_close_half": Kind(
-        "confirmed",
-        ">=",
-        "share of held-out error",
-        "If it leaves more than noise, its held-out run may close half of the error; else it is half as sure.",
+        "A map, or what only a long run shows, closes half of the held-out error; a cause that leaves more than noise "
+        "may close it, else it is half as sure.",
         ("half",),
     ),
     "closes_nearly_all": Kind(

@@ -162,7 +162,7 @@ class _Judgement:
         bench, limits = self.bench, self.bench.limits
         share, left = bench.explained(bench.refitted, bench.given), bench.left(bench.refitted)
         says = f"own values explain {share:.0%} of what the model as given leaves; at least {limits.half:.0%} is needed"
-        half = bench.check("values_explain_half", REFITTED, share, limits.half, says)
+        half = bench.check("explains_half_of_excess", REFITTED, share, limits.half, says)
         much = 2 * limits.negligible
         says = f"the refitted model leaves {left:.2%} of the signal beyond noise; less than {much:.0%} is needed"
         little = bench.check("values_leave_little", REFITTED, left, much, says)
