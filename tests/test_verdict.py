@@ -650,7 +650,7 @@ ROWS = [
     Row("right_shape", "other_shapes_of_two", "<=",
         evidence_of(card(8000.0, 0.02, "coulomb"), card(9024.0, 0.001, "coulomb", "cubic_hardening"), shapes=52.0),
         f"cause {BOTH}?", "undecided refitted", times=1024.0, of=BOTH),
-    Row("rest_without_shape", "rest_with_shape", "<=",
+    Row("right_shape", "rest_with_shape", "<=",
         evidence_of(card(9000.0, 0.002, "coulomb"), shapes=OtherShapes(0.0, 0.49)),
         f"cause {FRICTION}?", "undecided refitted"),
     # Confirmed

@@ -216,7 +216,8 @@ CHECKS: Mapping[str, Kind] = {
         "sufficient",
         "<=",
         "nats",
-        "Forces of other shapes would gain only a small share of what it gains itself (a score test).",
+        "Forces of other shapes would gain only a small share of what it gains itself (a score test), and would not "
+        "explain half of innovations that are not white.",
         (
             "other_shapes",
             "other_shapes_of_values",
@@ -224,15 +225,9 @@ CHECKS: Mapping[str, Kind] = {
             "other_shapes_of_two",
             "other_shapes_white",
             "other_shapes_of_white",
+            "rest_with_shape",
             "alike",
         ),
-    ),
-    "rest_without_shape": Kind(
-        "sufficient",
-        "<=",
-        "share of the innovations' power",
-        "Forces of other shapes would not explain half of what it leaves.",
-        ("rest_with_shape",),
     ),
     "not_worse": Kind(
         "confirmed",

@@ -8,7 +8,7 @@ from .bench import Bench, shown
 from .checks import Check
 from .decision import MODEL, Decision
 from .ranking import is_sure_of, rank
-from .right_shape import doubt, first_failed, settle_shape
+from .right_shape import doubt, settle_shape
 
 _DECIDING = ("map_adds_little", "visible_in_prediction", "better_than_given")
 """Checks that decide for a map or the model as given whatever else is likely."""
@@ -198,15 +198,14 @@ class _Judgement:
 
     def _values_are_right(self, winner: Scorecard) -> str:
         bench, of = self.bench, [winner.key]
-        far, checks = doubt(winner, winner.evidence - bench.given.evidence, bench)
+        far, check = doubt(winner, winner.evidence - bench.given.evidence, bench)
         bench.less_sure(of, "other shapes would gain beside it", 1.0 - 0.5 * min(far, 1.0))
-        failed = first_failed(checks)
-        if failed is not None:
+        if not check.passed:
             bench.less_sure(of, "it is refused", 0.0)
         row = self._probability_of(winner)
         if row.passed:
             return "parameters"
-        bench.stop(failed or row)
+        bench.stop(row if check.passed else check)
         return "undecided"
 
     def _probability_of(self, winner: Scorecard) -> Check:
