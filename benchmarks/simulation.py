@@ -41,10 +41,8 @@ jax.config.update("jax_enable_x64", True)
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import jfsm  # noqa: E402  (after double precision is on)
-from jfsm.dynamics import _simulate, lower  # noqa: E402
-from jfsm.dynamics._excitation import bucket  # noqa: E402
-from jfsm.dynamics._grid import Fine, run_grid  # noqa: E402
-from jfsm.dynamics._plant import Grid  # noqa: E402
+from jfsm.dynamics import _simulate  # noqa: E402
+from jfsm.plant import Fine, Grid, bucket, lower, run_grid  # noqa: E402
 from tests.blind.arrays import FloatArray, rms  # noqa: E402
 from tests.blind.drives import Drive, Silence, SumOfSines  # noqa: E402
 from tests.blind.exact import RELATIVE_TOLERANCE, integrate  # noqa: E402

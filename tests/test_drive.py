@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.dynamics._drive import reconstruct
-from jfsm.dynamics._excitation import bucket, excitation
+from jfsm.plant import bucket, excitation
+from jfsm.plant._drive import reconstruct
 
 METHODS = ("band-limited", "linear", "hold")
 EDGE = 32  # half width of the band-limited reconstruction: within it of an end the signal has to be guessed

@@ -10,9 +10,8 @@ from scipy.linalg import expm
 from scipy.stats import multivariate_normal
 
 import jfsm
-from jfsm.dynamics._excitation import excitation
-from jfsm.dynamics._plant import lower, readout
 from jfsm.estimation import Innovations, ProcessNoise, Readings, Start, innovations
+from jfsm.plant import excitation, lower, readout
 from jfsm.structures import (
     AccelerationGain,
     AttachedOscillator,

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.dynamics._grid import Fine, drive_before, punctual
-from jfsm.dynamics._plant import lower
 from jfsm.identification import (
     Hypothesis,
     Nuisances,
@@ -25,6 +23,7 @@ from jfsm.identification import (
 )
 from jfsm.identification._drive import forces_before, punctual_force
 from jfsm.identification._posterior import prior
+from jfsm.plant import Fine, drive_before, lower, punctual
 from jfsm.structures import AbstractTerm
 
 N, DT = 200, 0.05

@@ -9,8 +9,7 @@ from references import held, rows, smooth_motion, sticking_motion, straight
 
 import jfsm
 from jfsm._result import Result
-from jfsm.dynamics._grid import Fine, run_grid
-from jfsm.dynamics._plant import lower
+from jfsm.plant import Fine, lower, run_grid
 from jfsm.structures import AccelerationGain, ForceGain, MapTerm, Offset
 
 N, DT = 300, 0.05

@@ -9,9 +9,9 @@ from scipy.interpolate import make_interp_spline
 
 import jfsm
 from jfsm.dynamics._agreement import PARTED, agreement
-from jfsm.dynamics._drive import reconstruct
-from jfsm.dynamics._excitation import excitation
 from jfsm.dynamics._reference import coarser
+from jfsm.plant import excitation
+from jfsm.plant._drive import reconstruct
 
 PERIOD, DAMPING = 2 * np.pi, 0.1
 TIME = PERIOD / 40 * np.arange(30 * 40)

@@ -12,8 +12,8 @@ import jax
 import numpy as np
 
 from .._threads import side_by_side
-from ..dynamics._grid import Fine
 from ..identification import Nuisances
+from ..plant import Fine
 from ..records import Record
 from ..structures import Clipping
 from ._gain import BASE, remeasured

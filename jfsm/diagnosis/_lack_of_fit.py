@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..dynamics._plant import direction
 from ..identification import Posterior, missing_force
+from ..plant import direction
 from ._problem import Problem
 from ._score import moved, regressed
 from ._trial import Trial, free_run, runs_away

@@ -12,23 +12,28 @@ import numpy as np
 from .._programs import programs_kept
 from .._threads import side_by_side
 from .._types import as_array, require_x64
-from ..records import Record
-from ..structures import MapTerm, Structure
-from ._drive import Reconstruction
-from ._excitation import (
+from ..plant import (
+    Fine,
+    Grid,
+    Plant,
+    Reconstruction,
+    alone,
     bucket,
+    check_pair,
     excitation,
     force_limits,
+    free_run,
+    lower,
     measured_force,
     probes,
     relaxed_jacobian,
+    state_matrix,
     substeps_for,
     typical_size,
 )
-from ._grid import Fine, free_run
-from ._linearise import state_matrix
-from ._plant import Grid, Plant, alone, lower
-from ._simulate import check_pair, escapes, finer, motion_bound, with_tables
+from ..records import Record
+from ..structures import MapTerm, Structure
+from ._simulate import escapes, finer, motion_bound, with_tables
 
 _LANES = (1, 8, 64)
 """Runs that go side by side in one call of the program; beyond 64 their states leave the processor's cache."""

@@ -6,10 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._forces import hidden_rate, hidden_start, smooth_force
-from ._grid import Fine, punctual, true_force
-from ._plant import Plant
-from ._stepper import inverse_mass
+from ..plant import Fine, Plant, hidden_rate, hidden_start, inverse_mass, punctual, smooth_force, true_force
 
 STEPS_OF_DRIVE = 16
 """Steps per sample at least on which the drive is given. Between the half steps of 16 a sine with two samples a period

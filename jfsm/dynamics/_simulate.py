@@ -13,6 +13,33 @@ from scipy.interpolate import CubicSpline
 from .._programs import programs_kept
 from .._result import Result
 from .._types import as_numbers, is_traced, known, require_x64
+from ..plant import (
+    Fine,
+    Grid,
+    Plant,
+    Reconstruction,
+    alone,
+    bucket,
+    check_pair,
+    excitation,
+    force_limits,
+    force_needed,
+    free_acceleration,
+    imposed_motion,
+    imposed_substeps,
+    inverse_mass,
+    lower,
+    measured_force,
+    punctual,
+    readout,
+    run_again,
+    run_grid,
+    run_strided,
+    starting_state,
+    substeps_for,
+    true_force,
+    typical_size,
+)
 from ..records import Record
 from ..structures import (
     AbstractFriction,
@@ -29,15 +56,7 @@ from ..structures import (
 )
 from ..surrogates import AbstractForceStateMap, tabulate
 from ._agreement import Agreement, agreement
-from ._drive import Reconstruction
-from ._excitation import bucket, excitation, force_limits, measured_force, substeps_for, typical_size
-from ._grid import Fine, punctual, run_again, run_grid, run_strided, true_force
-from ._imposed import imposed_motion, imposed_substeps
-from ._needed import force_needed
-from ._plant import Grid, Plant, alone, lower, readout
 from ._reference import STEPS_OF_DRIVE, coarser, run_reference
-from ._start import starting_state
-from ._stepper import free_acceleration, inverse_mass
 
 Solver = Literal["reference", "grid"]
 
@@ -427,27 +446,6 @@ def _imposed_response(model: Structure, record: Record) -> Response:
         record.time, *path.motion(record.time), Result.successful, None, "grid", model.sensors,
         np.asarray(force)[: len(record)],
     )  # fmt: skip
-
-
-def check_pair(model: Structure, record: Record, *, imposed: bool = False) -> None:
-    """Refuse a record and a structure that do not belong together; `imposed` motions only where they are understood."""
-    if len(record) < 2:
-        raise ValueError(f"`record` must hold at least 2 samples; it has {len(record)}.")
-    if record.dofs > model.dof:
-        raise ValueError(f"`record` names degree of freedom {record.dofs}; the structure has {model.dof}.")
-    if record.drive == "motion":
-        if imposed:
-            return
-        raise ValueError(
-            '`record` has drive="motion"; here a force or a moving base must drive. `simulate`, `fit` and `diagnose` '
-            'take imposed motions; if the force drives the structure, make the record with drive="force".'
-        )
-    masses = np.asarray(known(model.mass, "`mass`"))
-    if masses.ndim == 1 and np.any(masses == 0):
-        raise ValueError(
-            f"`mass` must be positive for the structure to move; got {masses.tolist()}. "
-            'A mass of 0 is for imposed motion only: make the record with drive="motion" if that is what it is.'
-        )
 
 
 @eqx.filter_jit

@@ -26,22 +26,33 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from ..dynamics._forces import carried, friction_limits, settle
-from ..dynamics._grid import Fine, Past, advance_sample, begin, drive_before, load_of, punctual, remember, true_force
-from ..dynamics._kernel import as_one_kernel
-from ..dynamics._plant import Plant, Readout
-from ..dynamics._stepper import (
+from ..plant import (
+    Fine,
     Load,
     Motion,
+    Past,
+    Plant,
+    Readout,
     acceleration,
+    advance_sample,
     any_ended,
+    as_one_kernel,
+    begin,
+    carried,
+    drive_before,
+    friction_limits,
     holding_force,
     in_mode,
     inverse_mass,
     linearised,
+    load_of,
     mode_at,
+    punctual,
+    remember,
+    settle,
     stopping,
     through_events,
+    true_force,
     with_friction,
 )
 

@@ -9,9 +9,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..dynamics._imposed import Imposed
-from ..dynamics._needed import needed
-from ..dynamics._plant import Plant, Readout
+from ..plant import Imposed, Plant, Readout, needed
 from ._filter import Innovations, ProcessNoise, Readings
 
 

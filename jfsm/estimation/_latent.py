@@ -18,10 +18,7 @@ import scipy.linalg
 from jaxtyping import Array, Float
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
-from ..dynamics._along import force_along
-from ..dynamics._excitation import bucket
-from ..dynamics._grid import Fine, punctual, shifted
-from ..dynamics._plant import Plant, Readout
+from ..plant import Fine, Plant, Readout, bucket, force_along, punctual, shifted
 from ._kalman import LinearModel, log_likelihood, smoothed, swell_of
 
 _MEMORIES = (0.15, 1.0)

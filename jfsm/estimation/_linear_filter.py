@@ -15,8 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from ..dynamics._plant import Plant, Readout
-from ..dynamics._stepper import inverse_mass, times
+from ..plant import Plant, Readout, inverse_mass, times
 from ._filter import Assumed, Known, beside, short_transition, transition, zeros_of
 
 _SETTLED = 1e-12

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..dynamics._grid import Fine
+from ..plant import Fine
 
 
 def between_samples(force: np.ndarray, halves: int, count: int) -> np.ndarray:

@@ -20,12 +20,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from ..dynamics._grid import Fine, Past
-from ..dynamics._imposed import Imposed
-from ..dynamics._kernel import jit_with_kernels
-from ..dynamics._plant import Plant, Readout
 from ..estimation._filter import Assumed, Innovations, ProcessNoise, Readings, State, Stretch, begun, on_lanes, run
 from ..estimation._imposed import force_innovations
+from ..plant import Fine, Imposed, Past, Plant, Readout, jit_with_kernels
 from ._drive import between_samples, forces_before, punctual_force
 from ._layout import place_of, with_vector, without_part
 

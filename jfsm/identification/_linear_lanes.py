@@ -12,9 +12,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from ..dynamics._grid import Fine
 from ..estimation._filter import Innovations, few_states
 from ..estimation._linear_filter import Course, Errors, Law, follow
+from ..plant import Fine
 from ._drive import between_samples
 from ._layout import place_of, with_vector, without_part
 from ._likelihood import SAMPLES, Runs, Scene, tail_of

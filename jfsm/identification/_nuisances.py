@@ -8,20 +8,27 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from ..dynamics._drive import Reconstruction
-from ..dynamics._excitation import (
+from ..estimation._filter import ProcessNoise, Readings, Stretch
+from ..plant import (
+    Channel,
+    Fine,
+    Imposed,
+    Path,
+    Readout,
+    Reconstruction,
     bucket,
+    check_pair,
     excitation,
     fastest_mode,
+    imposed_motion,
+    imposed_substeps,
+    lower,
+    noise_of,
+    readout,
+    starting_state,
     substeps_for,
     typical_size,
 )
-from ..dynamics._grid import Fine
-from ..dynamics._imposed import Imposed, Path, imposed_motion, imposed_substeps, noise_of
-from ..dynamics._plant import Channel, Readout, lower, readout
-from ..dynamics._simulate import check_pair
-from ..dynamics._start import starting_state
-from ..estimation._filter import ProcessNoise, Readings, Stretch
 from ..records import Record, clipped, noise_floor, quantisation_step, spikes
 from ..structures import Structure
 from ._channels import LEAST_NOISE, driving, forces, readings_of, spread_of

@@ -9,9 +9,8 @@ import jax
 import numpy as np
 from scipy.optimize import minimize
 
-from ..dynamics._imposed import Imposed
-from ..dynamics._plant import Grid, Plant, hidden_width, numbers_of
 from ..estimation._filter import Innovations
+from ..plant import Grid, Imposed, Plant, hidden_width, numbers_of
 from ..structures import AbstractFriction, ChannelDelay, ForceDelay, Structure
 from ._colour import Colour
 from ._layout import plant_rows, plant_vector

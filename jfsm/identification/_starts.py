@@ -15,13 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import qmc
 
-from ..dynamics._along import SUBSTEPS
-from ..dynamics._excitation import bucket
-from ..dynamics._imposed import Imposed
-from ..dynamics._law_along import forces_of_law
-from ..dynamics._needed import force_needed
-from ..dynamics._plant import Grid, Plant, direction, lower
 from ..estimation import Latent, latent_force
+from ..plant import HIDDEN_SUBSTEPS, Grid, Imposed, Plant, bucket, direction, force_needed, forces_of_law, lower
 from ..structures import AbstractTerm, LinearDamping, LinearStiffness, MapTerm, Scale, Structure
 from ._nuisances import Nuisances
 
@@ -439,7 +434,7 @@ def _forces(law: AbstractTerm, numbers: np.ndarray, motion: _Motion, finer: int 
     """Forces (rows, n, dof) of a law along a motion for rows of its numbers."""
     row = direction(law.at, motion.x.shape[1])
     d, w = motion.x @ row, motion.v @ row
-    return forces_of_law(type(law), numbers, d, w, motion.time, substeps=finer * SUBSTEPS)[:, :, None] * row
+    return forces_of_law(type(law), numbers, d, w, motion.time, substeps=finer * HIDDEN_SUBSTEPS)[:, :, None] * row
 
 
 def _regressed(columns: np.ndarray, wanted: np.ndarray, q: np.ndarray):

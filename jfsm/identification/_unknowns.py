@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..dynamics._imposed import Imposed
+from ..plant import Imposed
 from ..structures import AccelerationBias, Offset, Parameter, Preload, Structure
 from ._nuisances import Nuisances
 

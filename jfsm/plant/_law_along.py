@@ -24,7 +24,7 @@ from ..structures import (
     MapTerm,
     Structure,
 )
-from ._along import SUBSTEPS
+from ._along import HIDDEN_SUBSTEPS
 from ._grid import delayed_along
 from ._plant import LAW_PARAMETERS, Plant, Slots, hidden_width, numbers_of
 from ._stepper import runge_kutta
@@ -41,7 +41,7 @@ def forces_of_law(
     w: Float[np.ndarray, " n"],
     time: Float[np.ndarray, " n"],
     *,
-    substeps: int = SUBSTEPS,
+    substeps: int = HIDDEN_SUBSTEPS,
 ) -> Float[np.ndarray, "rows n"]:
     """Force [N] of a law on a link of displacement `d` and velocity `w`, for rows of its numbers; friction slides.
 

@@ -183,6 +183,12 @@ def direction(at: tuple[int, int], dof: int) -> np.ndarray:
     return row
 
 
+def state_matrix(stiffness: np.ndarray, damping: np.ndarray) -> np.ndarray:
+    """Matrix of y' = matrix y, y = (x, v), from stiffness and damping (..., dof, dof) over the mass."""
+    one = np.broadcast_to(np.eye(stiffness.shape[-1]), stiffness.shape)
+    return np.block([[np.zeros_like(stiffness), one], [-stiffness, -damping]])
+
+
 def hidden_width(memory: Slots) -> int:
     """Hidden states per slot."""
     return max(HIDDEN_STATES, *(law.states for law in memory.laws))
