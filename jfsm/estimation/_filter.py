@@ -27,7 +27,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..plant import (
-    Fine,
+    InterpolatedInput,
     Load,
     Motion,
     Past,
@@ -248,7 +248,9 @@ class Known(NamedTuple):
 
 def begun(plant: Plant, assumed: Assumed, x0, v0, force: Float[Array, "3 dof"], base: Float[Array, " 3"], time, step):
     """State of a lane before its first sample, which begins with these forces; hidden states are relaxed."""
-    motion, past = begin(plant, inverse_mass(plant), x0, v0, Fine(force[None], base[None], time[None], step))
+    motion, past = begin(
+        plant, inverse_mass(plant), x0, v0, InterpolatedInput(force[None], base[None], time[None], step)
+    )
     beyond_doubt, zeros = jnp.full(len(plant.friction), _FAR), jnp.zeros(len(zeros_of(assumed)))
     return State(*motion[:3], motion.mode.astype(int), past, assumed.begin(), beyond_doubt, zeros)
 
@@ -352,7 +354,7 @@ def _carried_on(plant: Plant, known: Known, motion: Motion, after: Motion, updat
 def innovations(
     plant: Plant,
     show: Readout,
-    fine: Fine,
+    inputs: InterpolatedInput,
     readings: Readings,
     noise: ProcessNoise,
     start: Start,
@@ -365,20 +367,22 @@ def innovations(
     `log_scale` is the logarithm of the factor on each channel's noise variance.
     """
     variance = readings.variance * jnp.exp(log_scale)
-    fine, lone = punctual(plant, fine), lambda tree: jax.tree.map(lambda leaf: leaf[None], tree)
+    inputs, lone = punctual(plant, inputs), lambda tree: jax.tree.map(lambda leaf: leaf[None], tree)
     assumed = Assumed(
         variance, readings.wander, readings.colour, noise.velocity, start.covariance, readings.wandering,
         readings.coloured,
     )  # fmt: skip
-    n, _, dof = fine.force.shape
-    earlier = [drive_before(fine, tau) for tau in plant.channel_delay]
+    n, _, dof = inputs.force.shape
+    earlier = [drive_before(inputs, tau) for tau in plant.channel_delay]
     before = [jnp.concatenate([force, base[..., None]], 2) for force, base in earlier]
     before = jnp.stack(before, 1)[:, None] if before else jnp.zeros((n, 1, 0, 5, dof + 1))
-    stretch = Stretch(fine.force[:, :, None], fine.base, before, fine.time, readings.values, readings.use)
-    state = begun(plant, assumed, start.x, start.v, fine.force[0, :3], fine.base[0, :3], fine.time[0], fine.step)
+    stretch = Stretch(inputs.force[:, :, None], inputs.base, before, inputs.time, readings.values, readings.use)
+    state = begun(
+        plant, assumed, start.x, start.v, inputs.force[0, :3], inputs.base[0, :3], inputs.time[0], inputs.step
+    )
     floats, fixed = eqx.partition(plant, eqx.is_inexact_array)
     found = run(
-        eqx.combine(lone(floats), fixed), lone(assumed), show, stretch, fine.step, lone(state), one_kernel=one_kernel
+        eqx.combine(lone(floats), fixed), lone(assumed), show, stretch, inputs.step, lone(state), one_kernel=one_kernel
     )[1]
     return jax.tree.map(lambda leaf: leaf[:, 0], found)
 

@@ -18,7 +18,7 @@ import scipy.linalg
 from jaxtyping import Array, Float
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
-from ..plant import Fine, Plant, Readout, bucket, force_along, punctual, shifted
+from ..plant import InterpolatedInput, Plant, Readout, bucket, force_along, punctual, shifted
 from ._kalman import LinearModel, log_likelihood, smoothed, swell_of
 
 _MEMORIES = (0.15, 1.0)
@@ -62,7 +62,15 @@ class _Model(NamedTuple):
 
 
 def latent_force(
-    plant: Plant, show: Readout, fine: Fine, values, use, variance, force_covariance, omega: float, length: float
+    plant: Plant,
+    show: Readout,
+    inputs: InterpolatedInput,
+    values,
+    use,
+    variance,
+    force_covariance,
+    omega: float,
+    length: float,
 ) -> Latent:
     """Smoothed motion and missing force.
 
@@ -70,7 +78,7 @@ def latent_force(
     ----------
     plant : Plant
         With its sensors' gains, offsets and delays.
-    fine : Fine
+    inputs : InterpolatedInput
         What drives the record, at least as long as the readings.
     values, use : (n, channels) arrays
         Readings, and which of them count.
@@ -78,11 +86,11 @@ def latent_force(
     omega, length : float
         Angular frequency [rad/s] and size of the motion.
     """
-    n, dt = len(values), float(fine.step)
-    padded = min(bucket(n), fine.time.shape[0])  # nothing is read where it is filled up
+    n, dt = len(values), float(inputs.step)
+    padded = min(bucket(n), inputs.time.shape[0])  # nothing is read where it is filled up
     values, use = (np.pad(np.asarray(q), ((0, padded - n), (0, 0))) for q in (values, use))
-    base = np.asarray(fine.base)[:padded]
-    true = (np.asarray(punctual(plant, fine).force)[:padded] - np.asarray(plant.force_offset)) / (
+    base = np.asarray(inputs.base)[:padded]
+    true = (np.asarray(punctual(plant, inputs).force)[:padded] - np.asarray(plant.force_offset)) / (
         1 + np.asarray(plant.force_gain)
     )
     true = true - base[..., None] * np.asarray(plant.mass).sum(1)
@@ -95,7 +103,7 @@ def latent_force(
             plant,
             show,
             dt,
-            fine.substeps,
+            inputs.substeps,
             tau / omega,
             share * omega**2 * length,
             np.asarray(force_covariance),
@@ -128,7 +136,7 @@ def latent_force(
     mean, std = (np.asarray(out) for out in _smooth(model, *data, swell))
     x, v, r = mean[:, :dof], mean[:, dof : 2 * dof], mean[:, 2 * dof :]
     known = (
-        np.asarray(force_along(plant, jnp.asarray(x), jnp.asarray(v), fine.time[:padded]))
+        np.asarray(force_along(plant, jnp.asarray(x), jnp.asarray(v), inputs.time[:padded]))
         if plant.laws
         else np.zeros_like(x)
     )

@@ -77,14 +77,14 @@ def scale_of(nuisances: Nuisances, structure: Structure) -> Scale:
 def missing_force(structure: Structure, nuisances: Nuisances, most: int = _SAMPLES) -> Latent:
     """Smoothed motion of a record, its first `most` samples, and the force that a structure lacks to explain it."""
     n = min(nuisances.samples, most)
-    plant = lower(structure, nuisances.channels, grid=Grid(nuisances.record.dt, nuisances.fine.substeps))
+    plant = lower(structure, nuisances.channels, grid=Grid(nuisances.record.dt, nuisances.inputs.substeps))
     values, use = (np.asarray(q)[:n] for q in (nuisances.readings.values, nuisances.readings.use))
-    if isinstance(nuisances.fine, Imposed):
+    if isinstance(nuisances.inputs, Imposed):
         return _measured(plant, nuisances, values, use)
     return latent_force(
         plant,
         nuisances.show,
-        nuisances.fine,
+        nuisances.inputs,
         values,
         use,
         np.asarray(nuisances.readings.variance),
@@ -96,7 +96,7 @@ def missing_force(structure: Structure, nuisances: Nuisances, most: int = _SAMPL
 
 def _measured(plant: Plant, nuisances: Nuisances, values: np.ndarray, use: np.ndarray) -> Latent:
     """The force that a structure lacks along an imposed motion: what was measured, less what the motion needs."""
-    n, imposed = len(values), nuisances.fine
+    n, imposed = len(values), nuisances.inputs
     assert isinstance(imposed, Imposed)
     left = np.zeros((n, plant.dof))
     std = np.zeros_like(left)

@@ -13,7 +13,7 @@ from ..records import Record, declipped, silent_forces
 from ..structures import Clipping, LinearDamping, LinearStiffness, Structure
 from ._drive import Reconstruction, reconstruct
 from ._forces import hidden_start
-from ._grid import Fine
+from ._grid import InterpolatedInput
 from ._plant import Plant, numbers_of
 from ._stepper import inverse_mass, linearised
 
@@ -182,7 +182,7 @@ def excitation(
     length: int | None = None,
     force: Any = None,
     base: np.ndarray | None = None,
-) -> Fine:
+) -> InterpolatedInput:
     """Drive of a record on half steps, padded to `length` samples with its last value, which a late sensor asks for.
 
     `force` (n, dof) and `base` (n,) replace the record's own samples where they were smoothed or restored beforehand;
@@ -204,4 +204,4 @@ def excitation(
     intervals: Any = xp.concatenate([known, ahead])
     step: Any = np.asarray(record.dt)
     time = record.time[0] + record.dt * np.arange(padded)
-    return Fine(intervals[..., :dof], intervals[..., dof], time, step)
+    return InterpolatedInput(intervals[..., :dof], intervals[..., dof], time, step)

@@ -14,11 +14,11 @@ from ._plant import Plant
 from ._stepper import Load, Motion, acceleration, advance, inverse_mass, mode_at
 
 
-class Fine(eqx.Module):
-    """What drives a run between consecutive samples: forces on half steps.
+class InterpolatedInput(eqx.Module):
+    """Input of a run between consecutive samples, on half steps.
 
-    `force` (n, 2 substeps + 1, dof) belongs to the interval after each sample, `base` (n, 2 substeps + 1) is the
-    acceleration of the base.
+    `force` (n, 2 substeps + 1, dof) holds the applied forces of the interval after each sample, `base`
+    (n, 2 substeps + 1) the acceleration of the base.
     """
 
     force: Float[Array, "n halves dof"]
@@ -30,8 +30,8 @@ class Fine(eqx.Module):
     def substeps(self) -> int:
         return (self.force.shape[1] - 1) // 2
 
-    def by_steps(self, stride: int = 1, length: int | None = None) -> "Fine":
-        """The same drive with every `stride` steps a sample of one step, padded to `length` of these."""
+    def by_steps(self, stride: int = 1, length: int | None = None) -> "InterpolatedInput":
+        """The same input with every `stride` steps a sample of one step, padded to `length` of these."""
         n, count = self.force.shape[0], self.substeps // stride
         nodes = 2 * stride * np.arange(count)[:, None] + stride * np.arange(3)[None, :]
         given: Any = (self.force, self.base, self.time[0], self.step)
@@ -43,26 +43,28 @@ class Fine(eqx.Module):
             xp = jnp if is_traced(force) else np
             force, base = (xp.concatenate([q, xp.broadcast_to(q[-1:], (more, *q.shape[1:]))]) for q in (force, base))
         time = begin + step * np.arange(n * count + max(more, 0))
-        return Fine(jnp.asarray(force), jnp.asarray(base), jnp.asarray(time), jnp.asarray(step))
+        return InterpolatedInput(jnp.asarray(force), jnp.asarray(base), jnp.asarray(time), jnp.asarray(step))
 
 
-def punctual(plant: Plant, fine: Fine) -> Fine:
+def punctual(plant: Plant, inputs: InterpolatedInput) -> InterpolatedInput:
     """What drives a run with the delay of its force sensor undone: the force of t is what is read at t + tau."""
     if not plant.force_delay.size:
-        return fine
-    n, halves, dof = fine.force.shape
-    flat = _in_a_row(fine.force)
-    columns = [shifted(flat[:, j], plant.force_delay[j] / fine.step * (halves - 1)) for j in range(dof)]
+        return inputs
+    n, halves, dof = inputs.force.shape
+    flat = _in_a_row(inputs.force)
+    columns = [shifted(flat[:, j], plant.force_delay[j] / inputs.step * (halves - 1)) for j in range(dof)]
     later = jnp.stack(columns, 1)
     take = jnp.arange(n)[:, None] * (halves - 1) + jnp.arange(halves)[None, :]
-    return Fine(later[take], fine.base, fine.time, fine.step)
+    return InterpolatedInput(later[take], inputs.base, inputs.time, inputs.step)
 
 
-def drive_before(fine: Fine, tau: Float[Array, ""]) -> tuple[Float[Array, "n 5 dof"], Float[Array, "n 5"]]:
+def drive_before(
+    inputs: InterpolatedInput, tau: Float[Array, ""]
+) -> tuple[Float[Array, "n 5 dof"], Float[Array, "n 5"]]:
     """Forces, and accelerations of the base, from each sample back to tau earlier: two steps in time, on half steps."""
-    n, halves, dof = fine.force.shape
-    flat = _in_a_row(jnp.concatenate([fine.force, fine.base[..., None]], 2))
-    places = -tau / fine.step * (halves - 1) * jnp.linspace(0.0, 1.0, 5)
+    n, halves, dof = inputs.force.shape
+    flat = _in_a_row(jnp.concatenate([inputs.force, inputs.base[..., None]], 2))
+    places = -tau / inputs.step * (halves - 1) * jnp.linspace(0.0, 1.0, 5)
     earlier = jax.vmap(jax.vmap(shifted, (1, None), 1), (None, 0), 1)(flat, places)[: n * (halves - 1) : halves - 1]
     return earlier[..., :dof], earlier[..., dof]
 
@@ -211,32 +213,32 @@ def advance_sample(plant: Plant, minv, motion: Motion, force, base, time, step) 
     return jax.lax.scan(body, motion, (forces, bases, jnp.arange(substeps)))[0]
 
 
-def begin(plant: Plant, minv, x0, v0, fine: Fine) -> tuple[Motion, Past]:
+def begin(plant: Plant, minv, x0, v0, inputs: InterpolatedInput) -> tuple[Motion, Past]:
     """Motion and past at the first sample; hidden states are relaxed."""
     z0, past = hidden_start(plant, x0, v0), no_past(plant, x0)
     resting = Motion(x0, v0, z0, jnp.zeros(len(plant.friction)))
-    g = load_of(plant, minv, resting, past, fine.force[0], fine.base[0], fine.time[0], fine.step)[0]
-    return Motion(x0, v0, z0, mode_at(plant, minv, x0, v0, z0, g, fine.time[0])), past
+    g = load_of(plant, minv, resting, past, inputs.force[0], inputs.base[0], inputs.time[0], inputs.step)[0]
+    return Motion(x0, v0, z0, mode_at(plant, minv, x0, v0, z0, g, inputs.time[0])), past
 
 
 @eqx.filter_jit
-def run_grid(plant: Plant, fine: Fine, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
+def run_grid(plant: Plant, inputs: InterpolatedInput, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
     """Displacement, velocity and acceleration (relative to the base) at every sample, each (n, dof)."""
-    return free_run(plant, fine, x0, v0)
+    return free_run(plant, inputs, x0, v0)
 
 
 @eqx.filter_jit
-def run_strided(plant: Plant, fine: Fine, stride, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
+def run_strided(plant: Plant, inputs: InterpolatedInput, stride, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
     """As `run_grid`, in steps `stride` times as long; the same program whatever the stride.
 
     Nothing may answer the past.
     """
     minv = inverse_mass(plant)
-    fine = punctual(plant, fine)
-    h = fine.step / fine.substeps * stride
+    inputs = punctual(plant, inputs)
+    h = inputs.step / inputs.substeps * stride
 
-    def body(motion, inputs):
-        force, base, time = inputs
+    def body(motion, sample):
+        force, base, time = sample
         g = true_force(plant, force, base)
         a = acceleration(plant, minv, motion.x, motion.v, motion.z, motion.mode, g[0], time)[0]
 
@@ -247,31 +249,31 @@ def run_strided(plant: Plant, fine: Fine, stride, x0: Float[Array, " dof"], v0: 
             )
             return advance(plant, minv, motion, Load(forces, bases, time + i * h, h))
 
-        return jax.lax.fori_loop(0, fine.substeps // stride, step, motion), (motion.x, motion.v, a)
+        return jax.lax.fori_loop(0, inputs.substeps // stride, step, motion), (motion.x, motion.v, a)
 
-    motion, _ = begin(plant, minv, x0, v0, fine)
-    return jax.lax.scan(body, motion, (fine.force, fine.base, fine.time))[1]
+    motion, _ = begin(plant, minv, x0, v0, inputs)
+    return jax.lax.scan(body, motion, (inputs.force, inputs.base, inputs.time))[1]
 
 
 @eqx.filter_jit
-def run_again(plant: Plant, fine: Fine, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
+def run_again(plant: Plant, inputs: InterpolatedInput, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
     """As `run_grid`, for derivatives backwards: the inside of a step is gone through again and not kept."""
-    return free_run(plant, fine, x0, v0, again=True)
+    return free_run(plant, inputs, x0, v0, again=True)
 
 
-def free_run(plant: Plant, fine: Fine, x0, v0, again: bool = False):
+def free_run(plant: Plant, inputs: InterpolatedInput, x0, v0, again: bool = False):
     """As `run_grid`, to be traced; as `run_again` if so asked."""
     minv = inverse_mass(plant)
-    fine = punctual(plant, fine)
+    inputs = punctual(plant, inputs)
 
-    def body(carry, inputs):
+    def body(carry, sample):
         motion, past = carry
-        force, base, time = inputs
-        g = load_of(plant, minv, motion, past, force, base, time, fine.step)
+        force, base, time = sample
+        g = load_of(plant, minv, motion, past, force, base, time, inputs.step)
         a = acceleration(plant, minv, motion.x, motion.v, motion.z, motion.mode, g[0], time)[0]
-        after = advance_sample(plant, minv, motion, g, base, time, fine.step)
+        after = advance_sample(plant, minv, motion, g, base, time, inputs.step)
         return (after, remember(past, motion.x, motion.v)), (motion.x, motion.v, a)
 
-    start = begin(plant, minv, x0, v0, fine)
+    start = begin(plant, minv, x0, v0, inputs)
     steps = jax.checkpoint(body) if again else body
-    return jax.lax.scan(steps, start, (fine.force, fine.base, fine.time))[1]
+    return jax.lax.scan(steps, start, (inputs.force, inputs.base, inputs.time))[1]

@@ -61,7 +61,7 @@ def _least_squares(model: Structure, head: Record, reconstruction: Reconstructio
     spread = np.maximum(np.std(y, axis=0), 1e-12 * np.max(np.abs(y)) + 1e-300)
     padded = bucket(len(head))
     substeps = substeps_for(model, head.dt, typical_size(head))
-    fine = excitation(head, model.dof, substeps, reconstruction, length=padded)
+    inputs = excitation(head, model.dof, substeps, reconstruction, length=padded)
     counted = (np.arange(padded) < len(head)).astype(float)
     plant, show = lower(model, channels, grid=Grid(head.dt, substeps), rolled=True), readout(channels, model.dof)
     offset = y - np.asarray(plant.channel_offset)
@@ -70,7 +70,7 @@ def _least_squares(model: Structure, head: Record, reconstruction: Reconstructio
         if kind in ("displacement", "velocity"):
             state[(j - 1) + (model.dof if kind == "velocity" else 0)] = offset[0, i]
     readings = np.pad(y, ((0, padded - len(head)), (0, 0)))
-    known = plant, show, fine, readings, spread, counted
+    known = plant, show, inputs, readings, spread, counted
     _, state = min((_descended(known, begin) for begin in (state, *_rests(model, channels))), key=lambda end: end[0])
     return state[: model.dof], state[model.dof :]
 
@@ -88,10 +88,10 @@ def _descended(known: tuple, state: np.ndarray) -> tuple[float, np.ndarray]:
     On the host, from one program for residuals and slopes. `optimistix.LevenbergMarquardt` ends at the same states, but
     its loop around the run takes three to four times as long to compile, and twice as long to run.
     """
-    plant, show, fine, readings, spread, counted = known
+    plant, show, inputs, readings, spread, counted = known
     damp, best = 1e-6, None
     for _ in range(_ITERATIONS):
-        residual, slope = _residuals(plant, show, fine, readings, spread, counted, state)
+        residual, slope = _residuals(plant, show, inputs, readings, spread, counted, state)
         residual, slope = np.asarray(residual), np.asarray(slope)
         cost = float(residual @ residual) if np.all(np.isfinite(residual)) else np.inf
         if best is None or cost < best[0]:
@@ -113,15 +113,15 @@ def _descended(known: tuple, state: np.ndarray) -> tuple[float, np.ndarray]:
 
 
 @eqx.filter_jit
-def _residuals(plant, show, fine, y, spread, counted, state):
+def _residuals(plant, show, inputs, y, spread, counted, state):
     dof = plant.dof
 
     def residual(state):
-        x, v, a = free_run(plant, fine, state[:dof], state[dof:])
-        shown = {"displacement": x, "velocity": v, "acceleration": a + fine.base[:, :1]}
+        x, v, a = free_run(plant, inputs, state[:dof], state[dof:])
+        shown = {"displacement": x, "velocity": v, "acceleration": a + inputs.base[:, :1]}
         seen = jnp.stack([shown[kind] @ row for kind, row in zip(show.kinds, show.select, strict=True)], 1)
         told = jnp.broadcast_to(counted[:, None] > 0, seen.shape)
-        for tau, channel in zip(plant.channel_delay / fine.step, plant.late_channel, strict=True):
+        for tau, channel in zip(plant.channel_delay / inputs.step, plant.late_channel, strict=True):
             seen = seen.at[:, channel].set(shifted(seen[:, channel], -tau))
             then = jnp.arange(counted.size) - tau  # what was before the record no state at its start tells
             told = told.at[:, channel].set(told[:, channel] & (then >= 0) & (then <= jnp.sum(counted) - 1))
