@@ -30,8 +30,8 @@ from ..plant import (
     inverse_mass,
     lower,
     measured_force,
+    observation_of,
     punctual,
-    readout,
     run_again,
     run_grid,
     run_strided,
@@ -441,7 +441,7 @@ def _imposed_response(model: Structure, record: Record) -> Response:
     plain = [s for s in model.sensors if not isinstance(s, ForceGain | ForceDelay)]
     structure = Structure(model.mass, model.terms, plain, model.trust)
     plant = lower(structure, channels, grid=Grid(record.dt, substeps))
-    force = force_needed(plant, readout(channels, model.dof), path.imposed(substeps, bucket(len(record))))
+    force = force_needed(plant, observation_of(channels, model.dof), path.imposed(substeps, bucket(len(record))))
     return Response(
         record.time, *path.motion(record.time), Result.successful, None, "grid", model.sensors,
         np.asarray(force)[: len(record)],

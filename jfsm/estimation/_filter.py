@@ -30,9 +30,9 @@ from ..plant import (
     InterpolatedInput,
     Load,
     Motion,
+    Observation,
     Past,
     Plant,
-    Readout,
     acceleration,
     advance_sample,
     any_ended,
@@ -256,7 +256,14 @@ def begun(plant: Plant, assumed: Assumed, x0, v0, force: Float[Array, "3 dof"], 
 
 
 def run(
-    plants: Plant, assumed: Assumed, show: Readout, stretch: Stretch, dt, states: State, *, one_kernel: bool = False
+    plants: Plant,
+    assumed: Assumed,
+    observation: Observation,
+    stretch: Stretch,
+    dt,
+    states: State,
+    *,
+    one_kernel: bool = False,
 ) -> tuple[State, Innovations]:
     """States of all lanes after a stretch, and their innovations, each (n, lanes, channels).
 
@@ -267,11 +274,11 @@ def run(
     """
     of_zeros, alone = zeros_of(assumed), on_lanes(plants).first()
 
-    def loop(plants, known, show, dt, states, stretch):
-        return jax.lax.scan(partial(_sample, on_lanes(plants), known, show, of_zeros, dt), states, stretch)
+    def loop(plants, known, observation, dt, states, stretch):
+        return jax.lax.scan(partial(_sample, on_lanes(plants), known, observation, of_zeros, dt), states, stretch)
 
     run_all = as_one_kernel(loop) if one_kernel and few_states(alone, of_zeros) else loop
-    return run_all(plants, on_lanes(plants)(Known.of, assumed), show, dt, states, stretch)
+    return run_all(plants, on_lanes(plants)(Known.of, assumed), observation, dt, states, stretch)
 
 
 def few_states(plant: Plant, zeros: tuple[int | None, ...]) -> bool:
@@ -279,7 +286,9 @@ def few_states(plant: Plant, zeros: tuple[int | None, ...]) -> bool:
     return 2 * plant.dof + plant.hidden + len(zeros) <= _FEW and plant.elementary
 
 
-def _sample(each: Lanes, known: Known, show, of_zeros, dt, states: State, now: Stretch) -> tuple[State, Innovations]:
+def _sample(
+    each: Lanes, known: Known, observation, of_zeros, dt, states: State, now: Stretch
+) -> tuple[State, Innovations]:
     """States of all lanes after a sample, and its innovations."""
     force, base = jnp.moveaxis(now.force, 1, 0), now.base  # (lanes, halves, dof)
     substeps = (base.size - 1) // 2
@@ -287,7 +296,7 @@ def _sample(each: Lanes, known: Known, show, of_zeros, dt, states: State, now: S
     def read(plant, known, state, force, before):
         g = load_of(plant, known.minv, state.motion, state.past, force, base, now.time, dt)
         load = Load(g[:3], base[:3], now.time, dt / substeps)
-        return (*_read(plant, known, show, of_zeros, state, load, before, now.values, now.use), g)
+        return (*_read(plant, known, observation, of_zeros, state, load, before, now.values, now.use), g)
 
     motion, updated, zeros, past, seen, g = each(read, known, states, force, now.before)
     after = _advanced(each, known, motion, g, base, now.time, dt)
@@ -325,12 +334,12 @@ def _advanced(each: Lanes, known: Known, motion: Motion, g, base, time, dt) -> M
     return jax.lax.scan(step, motion, inputs)[0]
 
 
-def _read(plant: Plant, known: Known, show, of_zeros, state: State, load: Load, before, values, use):
+def _read(plant: Plant, known: Known, observation, of_zeros, state: State, load: Load, before, values, use):
     """Motion, covariance, zeros and past of a lane once it has read a sample, and the innovations."""
     motion, dof, rows = state.motion, plant.dof, plant.friction.direction
     mean, updated, found = _update(
-        plant, known.minv, show, motion, state.zeros, of_zeros, state.covariance, state.overrun, load, before, values,
-        use, known.variances, known.nothing,
+        plant, known.minv, observation, motion, state.zeros, of_zeros, state.covariance, state.overrun, load, before,
+        values, use, known.variances, known.nothing,
     )  # fmt: skip
     x, v, z, zeros = jnp.split(mean, [dof, 2 * dof, 2 * dof + plant.hidden])
     # A link that sticks stays so while the update leaves it at rest; otherwise its speed decides.
@@ -353,7 +362,7 @@ def _carried_on(plant: Plant, known: Known, motion: Motion, after: Motion, updat
 
 def innovations(
     plant: Plant,
-    show: Readout,
+    observation: Observation,
     inputs: InterpolatedInput,
     readings: Readings,
     noise: ProcessNoise,
@@ -382,7 +391,13 @@ def innovations(
     )
     floats, fixed = eqx.partition(plant, eqx.is_inexact_array)
     found = run(
-        eqx.combine(lone(floats), fixed), lone(assumed), show, stretch, inputs.step, lone(state), one_kernel=one_kernel
+        eqx.combine(lone(floats), fixed),
+        lone(assumed),
+        observation,
+        stretch,
+        inputs.step,
+        lone(state),
+        one_kernel=one_kernel,
     )[1]
     return jax.tree.map(lambda leaf: leaf[:, 0], found)
 
@@ -462,15 +477,15 @@ def _overrun(plant, before: Motion, after: Motion, covariance, slope, dt):
 
 
 def _update(
-    plant, minv, show, motion: Motion, zeros, of_zeros, covariance, overrun, load: Load, before, y, use, variances,
-    nothing,
+    plant, minv, observation, motion: Motion, zeros, of_zeros, covariance, overrun, load: Load, before, y, use,
+    variances, nothing,
 ) -> tuple[Float[Array, " state"], Float[Array, "state state"], Innovations]:  # fmt: skip
     """State after the readings of one sample, and their innovations; `overrun` tells how surely links rest, `load` is
     that of the sample's first step, `before` what drove it earlier, and speeds of links up to `nothing` are none."""
     at_first = jnp.concatenate([motion.x, motion.v, motion.z])
     mean, size = jnp.concatenate([at_first, zeros]), at_first.size
     late = [
-        (channel, *_late(plant, minv, show, tau, at_first, motion.mode, load, drive[:, :-1], drive[:, -1]))
+        (channel, *_late(plant, minv, observation, tau, at_first, motion.mode, load, drive[:, :-1], drive[:, -1]))
         for tau, channel, drive in zip(plant.channel_delay, plant.late_channel, before, strict=True)
     ]
     errors, spreads, shares = [], [], []
@@ -478,8 +493,8 @@ def _update(
         gain, mine = 1.0 + plant.channel_gain[c], jnp.array([float(channel == c) for channel in of_zeros])
         reading = y[c] - jnp.sum(mine * mean[size:])
         predicted, row, share = _predict(
-            plant, minv, show, c, mean[:size], covariance[:size, :size], motion.mode, overrun, load, reading, use[c],
-            variances[c], gain, nothing,
+            plant, minv, observation, c, mean[:size], covariance[:size, :size], motion.mode, overrun, load, reading,
+            use[c], variances[c], gain, nothing,
         )  # fmt: skip
         for channel, then, rows in late:  # what other channels have told of the motion by now moves it along its slope
             predicted = jnp.where(channel == c, then[c] + jnp.sum(rows[c] * (mean[:size] - at_first)), predicted)
@@ -498,13 +513,13 @@ def _update(
     return mean, covariance, Innovations(jnp.stack(errors), jnp.stack(spreads), jnp.stack(shares))
 
 
-def _predict(plant, minv, show, c, mean, covariance, mode, overrun, load: Load, y, use, variance, gain, nothing):
+def _predict(plant, minv, observation, c, mean, covariance, mode, overrun, load: Load, y, use, variance, gain, nothing):
     """Reading of channel `c` without gain and offset, its derivative by the state, and the reading's `log_share`."""
     dof, certain = plant.dof, jnp.zeros(())
-    select, none, hidden = show.select[c], jnp.zeros(dof), jnp.zeros(plant.hidden)
-    if show.kinds[c] == "displacement":
+    select, none, hidden = observation.select[c], jnp.zeros(dof), jnp.zeros(plant.hidden)
+    if observation.kinds[c] == "displacement":
         return jnp.sum(select * mean[:dof]), jnp.concatenate([select, none, hidden]), certain
-    if show.kinds[c] == "velocity":
+    if observation.kinds[c] == "velocity":
         return jnp.sum(select * mean[dof : 2 * dof]), jnp.concatenate([none, select, hidden]), certain
     x, v, z = mean[:dof], mean[dof : 2 * dof], mean[2 * dof :]
     without = linearised(plant, minv, x, v, z, load.force[0], load.time)
@@ -518,7 +533,7 @@ def _predict(plant, minv, show, c, mean, covariance, mode, overrun, load: Load, 
     return jnp.sum(select * (a + load.base[0])), jnp.sum(select[:, None] * by_state, 0), log_share
 
 
-def _late(plant, minv, show, tau, mean, mode, load: Load, force, base):
+def _late(plant, minv, observation, tau, mean, mode, load: Load, force, base):
     """Readings (channels,) of the motion of a moment ago, two steps back in time, and their derivative by the state.
 
     `force` (5, dof) and `base` (5,) are what was measured from now back to then. What answers the past stays as it is.
@@ -532,7 +547,8 @@ def _late(plant, minv, show, tau, mean, mode, load: Load, force, base):
         then = advance_sample(plant, minv, now, g, base, load.time, -tau)
         a = acceleration(plant, minv, *then, g[-1], load.time - tau)[0]
         shown = {"displacement": then.x, "velocity": then.v, "acceleration": a + base[-1]}
-        return jnp.stack([jnp.sum(row * shown[kind]) for row, kind in zip(show.select, show.kinds, strict=True)])
+        rows = zip(observation.select, observation.kinds, strict=True)
+        return jnp.stack([jnp.sum(row * shown[kind]) for row, kind in rows])
 
     return jax.vmap(lambda e: jax.jvp(readings, (mean,), (e,)), out_axes=(None, 1))(jnp.eye(mean.size))
 

@@ -18,7 +18,7 @@ import scipy.linalg
 from jaxtyping import Array, Float
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
-from ..plant import InterpolatedInput, Plant, Readout, bucket, force_along, punctual, shifted
+from ..plant import InterpolatedInput, Observation, Plant, bucket, force_along, punctual, shifted
 from ._kalman import LinearModel, log_likelihood, smoothed, swell_of
 
 _MEMORIES = (0.15, 1.0)
@@ -63,7 +63,7 @@ class _Model(NamedTuple):
 
 def latent_force(
     plant: Plant,
-    show: Readout,
+    observation: Observation,
     inputs: InterpolatedInput,
     values,
     use,
@@ -96,12 +96,12 @@ def latent_force(
     true = true - base[..., None] * np.asarray(plant.mass).sum(1)
     seen = (values - np.asarray(plant.channel_offset)) / (1 + np.asarray(plant.channel_gain))
     seen, use = _on_time(plant, seen, use, dt)
-    acceleration = np.array([kind == "acceleration" for kind in show.kinds])
+    acceleration = np.array([kind == "acceleration" for kind in observation.kinds])
     seen = seen - base[:, :1] * acceleration
     models = [
         _model(
             plant,
-            show,
+            observation,
             dt,
             inputs.substeps,
             tau / omega,
@@ -158,7 +158,7 @@ def _on_time(plant: Plant, seen: np.ndarray, use: np.ndarray, dt: float) -> tupl
 
 
 def _model(
-    plant: Plant, show: Readout, dt, substeps, tau, amplitude, force_covariance, variance, omega, length
+    plant: Plant, observation: Observation, dt, substeps, tau, amplitude, force_covariance, variance, omega, length
 ) -> _Model:
     dof = plant.dof
     minv = np.linalg.inv(np.asarray(plant.mass))
@@ -188,10 +188,10 @@ def _model(
         "velocity": np.hstack([zero, eye, zero]),
         "acceleration": rate[dof : 2 * dof],
     }
-    select = np.asarray(show.select)
-    rows = np.array([s @ row[kind] for kind, s in zip(show.kinds, select, strict=True)])
+    select = np.asarray(observation.select)
+    rows = np.array([s @ row[kind] for kind, s in zip(observation.kinds, select, strict=True)])
     through = np.array(
-        [s @ minv if kind == "acceleration" else 0 * s for kind, s in zip(show.kinds, select, strict=True)]
+        [s @ minv if kind == "acceleration" else 0 * s for kind, s in zip(observation.kinds, select, strict=True)]
     )
     sizes = np.concatenate([np.full(dof, length), np.full(dof, length * omega), amplitude * mass])
     start = np.diag((_WIDE * sizes) ** 2)

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from ..plant import Plant, Readout, inverse_mass, times
+from ..plant import Observation, Plant, inverse_mass, times
 from ._filter import Assumed, Known, beside, short_transition, transition, zeros_of
 
 _SETTLED = 1e-12
@@ -43,16 +43,16 @@ class Law(NamedTuple):
     inertia: Float[Array, " dof"]
 
     @classmethod
-    def of(cls, plant: Plant, assumed: Assumed, show: Readout, dt: Float[Array, ""], substeps: int) -> "Law":
+    def of(cls, plant: Plant, assumed: Assumed, observation: Observation, dt: Float[Array, ""], substeps: int) -> "Law":
         known, minv, dof = Known.of(plant, assumed), inverse_mass(plant), plant.dof
         answer = -jnp.concatenate([minv @ plant.stiffness, minv @ plant.damping], 1)
         rates = jnp.concatenate([jnp.eye(dof, 2 * dof, dof), answer])
         step, push = _runge_kutta(rates, minv, dt / substeps, substeps)
         zeros, gain = zeros_of(assumed), 1.0 + plant.channel_gain
         seen = {"displacement": jnp.eye(dof, 2 * dof), "velocity": jnp.eye(dof, 2 * dof, dof), "acceleration": answer}
-        rows = jnp.stack([row @ seen[kind] for row, kind in zip(show.select, show.kinds, strict=True)])
-        added_to = np.array([[channel == c for channel in zeros] for c in range(len(show.kinds))], float)
-        driven = gain * np.array([kind == "acceleration" for kind in show.kinds], float)
+        rows = jnp.stack([row @ seen[kind] for row, kind in zip(observation.select, observation.kinds, strict=True)])
+        added_to = np.array([[channel == c for channel in zeros] for c in range(len(observation.kinds))], float)
+        driven = gain * np.array([kind == "acceleration" for kind in observation.kinds], float)
         return cls(
             beside(step, known.onward),
             jnp.pad(push, ((0, 0), (0, len(zeros)), (0, 0))),
@@ -60,8 +60,8 @@ class Law(NamedTuple):
             beside(known.added, known.stirred),
             assumed.begin(),
             jnp.concatenate([gain[:, None] * rows, added_to.reshape(len(rows), len(zeros))], 1),
-            driven[:, None] * (show.select @ minv),
-            driven * jnp.sum(show.select, 1),
+            driven[:, None] * (observation.select @ minv),
+            driven * jnp.sum(observation.select, 1),
             known.variances,
             jnp.sum(plant.mass, 1),
         )

@@ -22,7 +22,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..estimation._filter import Assumed, Innovations, ProcessNoise, Readings, State, Stretch, begun, on_lanes, run
 from ..estimation._imposed import force_innovations
-from ..plant import Imposed, InterpolatedInput, Past, Plant, Readout, jit_with_kernels
+from ..plant import Imposed, InterpolatedInput, Observation, Past, Plant, jit_with_kernels
 from ._drive import between_samples, forces_before, punctual_force
 from ._layout import place_of, with_vector, without_part
 
@@ -161,7 +161,7 @@ class Scene:
     """
 
     plant: Plant
-    show: Readout
+    observation: Observation
     inputs: InterpolatedInput | Imposed
     readings: Readings
     doubt: Any
@@ -169,8 +169,8 @@ class Scene:
 
     @cached_property
     def lowered(self) -> tuple[list[Array], Any]:
-        """Arrays on the device, and what makes plant, noise and readout of them; the drive has the force's delay."""
-        seen = without_part(self.plant, "force_delay"), Noise.of(self.readings, self.doubt), self.show
+        """Arrays on the device, and the tree of plant, noise and observation; the drive has the force's delay."""
+        seen = without_part(self.plant, "force_delay"), Noise.of(self.readings, self.doubt), self.observation
         leaves, static = jax.tree.flatten(seen)
         return jax.device_put(leaves), static
 
@@ -276,9 +276,9 @@ def _run(
 ) -> tuple[State, Innovations]:
     """State of all lanes after a stretch, and innovations (n, lanes, channels); the `first` one has no state yet.
 
-    `leaves` and `static` are a plant, `Noise` and a readout.
+    `leaves` and `static` are a plant, `Noise` and an `Observation`.
     """
-    plant, noise, show = jax.tree.unflatten(static, leaves)
+    plant, noise, observation = jax.tree.unflatten(static, leaves)
     floats, fixed = eqx.partition(plant, eqx.is_inexact_array)
 
     def lane(row: Float[Array, " size"]) -> Plant:
@@ -297,7 +297,7 @@ def _run(
         return on_lanes(plants)(one, assumed, x0, v0, force)
 
     state = jax.lax.cond(first, begin, lambda: state)
-    return run(plants, assumed, show, stretch, dt, state, one_kernel=one_kernel)
+    return run(plants, assumed, observation, stretch, dt, state, one_kernel=one_kernel)
 
 
 def tail_of(plant: Plant, numbers, channels: int):
@@ -351,17 +351,19 @@ def _along_motion(scene: Scene, runs: Runs, count: int, found: Innovations) -> N
         use: Any = np.zeros(seen.use.shape)
         use[: len(runs.use)] = runs.use[: len(use)]
         seen = replace(seen, use=use)
-    along = _along(scene.plant, runs.numbers, scene.show, scene.inputs, seen, runs.velocity, scene.doubt)
+    along = _along(scene.plant, runs.numbers, scene.observation, scene.inputs, seen, runs.velocity, scene.doubt)
     for whole, part in zip(found, along, strict=True):
         whole[:] = np.asarray(part)[: len(whole), :count]
 
 
 @eqx.filter_jit
-def _along(plant: Plant, numbers, show: Readout, inputs: Any, readings: Readings, velocity, doubt) -> Innovations:
+def _along(
+    plant: Plant, numbers, observation: Observation, inputs: Any, readings: Readings, velocity, doubt
+) -> Innovations:
     log_scale = tail_of(plant, numbers, readings.values.shape[1])[2]
 
     def one(numbers, velocity, log_scale):
         lane = with_vector(plant, numbers)
-        return force_innovations(lane, show, inputs, readings, ProcessNoise(velocity), doubt, log_scale)
+        return force_innovations(lane, observation, inputs, readings, ProcessNoise(velocity), doubt, log_scale)
 
     return jax.vmap(one)(numbers, velocity, log_scale)

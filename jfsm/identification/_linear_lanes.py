@@ -126,10 +126,12 @@ def _law(
     velocity: Float[Array, "laws dof dof"],
     dt: Float[Array, ""],
 ) -> Law:
-    """The law of every row of numbers; `leaves` and `static` are a plant, `Noise` and a readout."""
-    plant, noise, show = jax.tree.unflatten(static, leaves)
+    """The law of every row of numbers; `leaves` and `static` are a plant, `Noise` and an `Observation`."""
+    plant, noise, observation = jax.tree.unflatten(static, leaves)
     assumed = noise.assumed(tail_of(plant, numbers, noise.variance.size)[2], velocity)
-    return jax.vmap(lambda row, assumed: Law.of(with_vector(plant, row), assumed, show, dt, substeps))(numbers, assumed)
+    return jax.vmap(lambda row, assumed: Law.of(with_vector(plant, row), assumed, observation, dt, substeps))(
+        numbers, assumed
+    )
 
 
 @jax.jit

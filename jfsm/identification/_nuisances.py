@@ -13,8 +13,8 @@ from ..plant import (
     Channel,
     Imposed,
     InterpolatedInput,
+    Observation,
     Path,
-    Readout,
     Reconstruction,
     bucket,
     check_pair,
@@ -24,7 +24,7 @@ from ..plant import (
     imposed_substeps,
     lower,
     noise_of,
-    readout,
+    observation_of,
     starting_state,
     substeps_for,
     typical_size,
@@ -116,7 +116,7 @@ class Nuisances:
 
     record: Record
     channels: tuple[Channel, ...]
-    show: Readout
+    observation: Observation
     inputs: InterpolatedInput | Imposed
     readings: Readings
     noise: ProcessNoise
@@ -311,7 +311,7 @@ def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "
     return Nuisances(
         record=record,
         channels=channels,
-        show=readout(channels, model.dof),
+        observation=observation_of(channels, model.dof),
         inputs=_drive(record, model, reconstruction, force.samples, None if base is None else base.samples),
         readings=_padded(values, seen.use, noise.shown_by(channels, floor, mass)),
         noise=_disturbance(mass, covariance, omega, length, record.dt),
@@ -379,7 +379,7 @@ def _prepare_imposed(record: Record, model: Structure, reconstruction: Reconstru
     return Nuisances(
         record=record,
         channels=channels,
-        show=readout(channels, model.dof),
+        observation=observation_of(channels, model.dof),
         inputs=path.imposed(imposed_substeps(model, record.dt, typical_size(record)), bucket(len(record))),
         readings=_padded(values, use, floor**2),
         noise=ProcessNoise(still),

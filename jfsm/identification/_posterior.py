@@ -290,7 +290,7 @@ class _Part:
         imposed = isinstance(nuisances.inputs, Imposed)
         inputs, readings = nuisances.head(until) if imposed else (nuisances.inputs, nuisances.readings)
         doubt = _doubt(self.plant, nuisances)
-        return Scene(self.plant, nuisances.show, inputs, readings, doubt, nuisances.stretches)
+        return Scene(self.plant, nuisances.observation, inputs, readings, doubt, nuisances.stretches)
 
     def numbers(self, theta: np.ndarray) -> np.ndarray:
         """Numbers (runs, size) at values (runs, unknowns)."""

@@ -83,7 +83,7 @@ def missing_force(structure: Structure, nuisances: Nuisances, most: int = _SAMPL
         return _measured(plant, nuisances, values, use)
     return latent_force(
         plant,
-        nuisances.show,
+        nuisances.observation,
         nuisances.inputs,
         values,
         use,
@@ -100,7 +100,7 @@ def _measured(plant: Plant, nuisances: Nuisances, values: np.ndarray, use: np.nd
     assert isinstance(imposed, Imposed)
     left = np.zeros((n, plant.dof))
     std = np.zeros_like(left)
-    known = np.asarray(force_needed(plant, nuisances.show, imposed))[:n]
+    known = np.asarray(force_needed(plant, nuisances.observation, imposed))[:n]
     for i in np.flatnonzero(nuisances.judged):
         j, seen = nuisances.channels[i][1] - 1, use[:, i] > 0
         lacking = (values[:, i] - known[:, j]) / (1.0 + float(plant.force_gain[j]))

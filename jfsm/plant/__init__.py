@@ -46,14 +46,14 @@ from ._needed import needed as needed
 from ._pair import check_pair as check_pair
 from ._plant import Channel as Channel
 from ._plant import Grid as Grid
+from ._plant import Observation as Observation
 from ._plant import Plant as Plant
-from ._plant import Readout as Readout
 from ._plant import alone as alone
 from ._plant import direction as direction
 from ._plant import hidden_width as hidden_width
 from ._plant import lower as lower
 from ._plant import numbers_of as numbers_of
-from ._plant import readout as readout
+from ._plant import observation_of as observation_of
 from ._plant import state_matrix as state_matrix
 from ._start import starting_state as starting_state
 from ._stepper import Load as Load

@@ -15,7 +15,7 @@ from jaxtyping import Array, Float
 from ._forces import friction_limits, hidden_rate, hidden_start, settle, smooth_force
 from ._grid import delayed_along, shifted
 from ._imposed import Imposed
-from ._plant import Plant, Readout
+from ._plant import Observation, Plant
 from ._stepper import runge_kutta
 
 _NOTHING = 1e-300
@@ -35,16 +35,16 @@ class Needed(NamedTuple):
 
 
 @eqx.filter_jit
-def force_needed(plant: Plant, show: Readout, imposed: Imposed) -> Float[Array, "n dof"]:
+def force_needed(plant: Plant, observation: Observation, imposed: Imposed) -> Float[Array, "n dof"]:
     """Force (n, dof) of an imposed motion, hidden states relaxed at the start."""
-    return needed(plant, show, imposed, jnp.zeros(())).force
+    return needed(plant, observation, imposed, jnp.zeros(())).force
 
 
-def needed(plant: Plant, show: Readout, imposed: Imposed, doubt: Float[Array, ""]) -> Needed:
+def needed(plant: Plant, observation: Observation, imposed: Imposed, doubt: Float[Array, ""]) -> Needed:
     """As `force_needed`, to be traced, with its error; `doubt` is that of what laws remember at the start, as a
     share of its rms along the motion: hidden states, and the motion before it began.
     """
-    moved = _recentred(plant, show, imposed)
+    moved = _recentred(plant, observation, imposed)
     x, v, time = moved.x[:, 0], moved.v[:, 0], moved.time
     z0 = hidden_start(plant, x[0], v[0])
     push = jax.vmap(lambda e: jax.jvp(lambda z: _hidden_along(plant, moved, z), (z0,), (e,)), out_axes=(None, -1))
@@ -79,10 +79,10 @@ def needed(plant: Plant, show: Readout, imposed: Imposed, doubt: Float[Array, ""
     )
 
 
-def _recentred(plant: Plant, show: Readout, imposed: Imposed) -> Imposed:
+def _recentred(plant: Plant, observation: Observation, imposed: Imposed) -> Imposed:
     """The motion without the offsets of its displacement channels."""
-    rows = [i for i, kind in enumerate(show.kinds) if kind == "displacement"]
-    shift = sum((plant.channel_offset[i] * show.select[i] for i in rows), jnp.zeros(plant.dof))
+    rows = [i for i, kind in enumerate(observation.kinds) if kind == "displacement"]
+    shift = sum((plant.channel_offset[i] * observation.select[i] for i in rows), jnp.zeros(plant.dof))
     return eqx.tree_at(lambda m: m.x, imposed, imposed.x - shift[None, None, :])
 
 

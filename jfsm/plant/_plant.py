@@ -159,19 +159,19 @@ class Plant(eqx.Module):
         return len(self.memory) * hidden_width(self.memory)
 
 
-class Readout(eqx.Module):
-    """Which response each channel shows: its kind, and a row that selects the degree of freedom."""
+class Observation(eqx.Module):
+    """Observation of the state by response channels: the kind of each, and a row that selects its degree of freedom."""
 
     select: Float[Array, "channels dof"]
     kinds: tuple[str, ...] = eqx.field(static=True)
 
 
-def readout(channels: Sequence[Channel], dof: int) -> Readout:
-    """Selectors of the response channels (kind, degree of freedom)."""
+def observation_of(channels: Sequence[Channel], dof: int) -> Observation:
+    """Observation by response channels (kind, degree of freedom)."""
     rows = np.zeros((len(channels), dof))
     for i, (_, j) in enumerate(channels):
         rows[i, j - 1] = 1.0
-    return Readout(jnp.asarray(rows), tuple(kind for kind, _ in channels))
+    return Observation(jnp.asarray(rows), tuple(kind for kind, _ in channels))
 
 
 def direction(at: tuple[int, int], dof: int) -> np.ndarray:

@@ -14,7 +14,7 @@ from ..structures import Structure
 from ._drive import Reconstruction
 from ._excitation import bucket, excitation, substeps_for, typical_size
 from ._grid import free_run, shifted
-from ._plant import Channel, Grid, lower, readout
+from ._plant import Channel, Grid, lower, observation_of
 
 _ITERATIONS = 12
 
@@ -63,14 +63,15 @@ def _least_squares(model: Structure, head: Record, reconstruction: Reconstructio
     substeps = substeps_for(model, head.dt, typical_size(head))
     inputs = excitation(head, model.dof, substeps, reconstruction, length=padded)
     counted = (np.arange(padded) < len(head)).astype(float)
-    plant, show = lower(model, channels, grid=Grid(head.dt, substeps), rolled=True), readout(channels, model.dof)
+    plant = lower(model, channels, grid=Grid(head.dt, substeps), rolled=True)
+    observation = observation_of(channels, model.dof)
     offset = y - np.asarray(plant.channel_offset)
     state = np.zeros(2 * model.dof)
     for i, (kind, j) in enumerate(channels):  # a measured channel is its own best first guess
         if kind in ("displacement", "velocity"):
             state[(j - 1) + (model.dof if kind == "velocity" else 0)] = offset[0, i]
     readings = np.pad(y, ((0, padded - len(head)), (0, 0)))
-    known = plant, show, inputs, readings, spread, counted
+    known = plant, observation, inputs, readings, spread, counted
     _, state = min((_descended(known, begin) for begin in (state, *_rests(model, channels))), key=lambda end: end[0])
     return state[: model.dof], state[model.dof :]
 
@@ -88,10 +89,10 @@ def _descended(known: tuple, state: np.ndarray) -> tuple[float, np.ndarray]:
     On the host, from one program for residuals and slopes. `optimistix.LevenbergMarquardt` ends at the same states, but
     its loop around the run takes three to four times as long to compile, and twice as long to run.
     """
-    plant, show, inputs, readings, spread, counted = known
+    plant, observation, inputs, readings, spread, counted = known
     damp, best = 1e-6, None
     for _ in range(_ITERATIONS):
-        residual, slope = _residuals(plant, show, inputs, readings, spread, counted, state)
+        residual, slope = _residuals(plant, observation, inputs, readings, spread, counted, state)
         residual, slope = np.asarray(residual), np.asarray(slope)
         cost = float(residual @ residual) if np.all(np.isfinite(residual)) else np.inf
         if best is None or cost < best[0]:
@@ -113,13 +114,14 @@ def _descended(known: tuple, state: np.ndarray) -> tuple[float, np.ndarray]:
 
 
 @eqx.filter_jit
-def _residuals(plant, show, inputs, y, spread, counted, state):
+def _residuals(plant, observation, inputs, y, spread, counted, state):
     dof = plant.dof
 
     def residual(state):
         x, v, a = free_run(plant, inputs, state[:dof], state[dof:])
         shown = {"displacement": x, "velocity": v, "acceleration": a + inputs.base[:, :1]}
-        seen = jnp.stack([shown[kind] @ row for kind, row in zip(show.kinds, show.select, strict=True)], 1)
+        rows = zip(observation.kinds, observation.select, strict=True)
+        seen = jnp.stack([shown[kind] @ row for kind, row in rows], 1)
         told = jnp.broadcast_to(counted[:, None] > 0, seen.shape)
         for tau, channel in zip(plant.channel_delay / inputs.step, plant.late_channel, strict=True):
             seen = seen.at[:, channel].set(shifted(seen[:, channel], -tau))
