@@ -21,9 +21,9 @@ from jfsm.identification import (
     prepare,
     with_offsets,
 )
-from jfsm.identification._drive import forces_before, punctual_force
+from jfsm.identification._drive import forces_before, undelayed_force
 from jfsm.identification._posterior import prior
-from jfsm.plant import InterpolatedInput, drive_before, lower, punctual
+from jfsm.plant import InterpolatedInput, drive_before, lower, undelayed
 from jfsm.structures import AbstractTerm
 
 N, DT = 200, 0.05
@@ -181,8 +181,8 @@ def test_delays_that_begin_far_apart_run_side_by_side(single_nuisances):
 @pytest.mark.parametrize("delay", [0.0, 0.3, -1.7])
 def test_what_drives_a_late_sensor_is_the_same_on_the_host_as_in_a_run(single_nuisances, delay):
     inputs, plant = single_nuisances.inputs, lower(SINGLE + jfsm.structures.ForceDelay(delay * DT, at=("force", 1)))
-    there = punctual(plant, inputs).force
-    np.testing.assert_allclose(punctual_force(np.asarray(inputs.force), np.array([delay])), there, atol=1e-12)
+    there = undelayed(plant, inputs).force
+    np.testing.assert_allclose(undelayed_force(np.asarray(inputs.force), np.array([delay])), there, atol=1e-12)
     force, base = drive_before(inputs, jnp.asarray(delay * DT))
     here = forces_before(inputs, delay * DT)
     np.testing.assert_allclose(here, np.concatenate([force, np.asarray(base)[..., None]], 2), atol=1e-12)

@@ -12,9 +12,9 @@ from ..plant import (
     hidden_rate,
     hidden_start,
     inverse_mass,
-    punctual,
     smooth_force,
     true_force,
+    undelayed,
 )
 
 STEPS_OF_DRIVE = 16
@@ -35,7 +35,7 @@ def run_reference(plant: Plant, inputs: InterpolatedInput, x0, v0, tolerance, sc
     Between its half steps the drive is the quintic through the six nearest of the same sample.
     """
     minv = inverse_mass(plant)
-    inputs = punctual(plant, inputs)
+    inputs = undelayed(plant, inputs)
     n, halves, dof = inputs.force.shape
     forces = true_force(plant, inputs.force.reshape(n * halves, -1), inputs.base.reshape(-1)).reshape(
         inputs.force.shape

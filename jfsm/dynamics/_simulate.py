@@ -31,7 +31,6 @@ from ..plant import (
     lower,
     measured_force,
     observation_of,
-    punctual,
     run_again,
     run_grid,
     run_strided,
@@ -39,6 +38,7 @@ from ..plant import (
     substeps_for,
     true_force,
     typical_size,
+    undelayed,
 )
 from ..records import Record
 from ..structures import (
@@ -451,7 +451,7 @@ def _imposed_response(model: Structure, record: Record) -> Response:
 @eqx.filter_jit
 def _accelerations(plant: Plant, inputs, x, v, z):
     """Accelerations (n, dof) along a motion."""
-    minv, inputs = inverse_mass(plant), punctual(plant, inputs)
+    minv, inputs = inverse_mass(plant), undelayed(plant, inputs)
 
     def one(force, base, time, x, v, z):
         return free_acceleration(plant, minv, x, v, z, true_force(plant, force[:1], base[:1])[0], time)

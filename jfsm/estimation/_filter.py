@@ -47,12 +47,12 @@ from ..plant import (
     linearised,
     load_of,
     mode_at,
-    punctual,
     remember,
     settle,
     stopping,
     through_events,
     true_force,
+    undelayed,
     with_friction,
 )
 
@@ -376,7 +376,7 @@ def innovations(
     `log_scale` is the logarithm of the factor on each channel's noise variance.
     """
     variance = readings.variance * jnp.exp(log_scale)
-    inputs, lone = punctual(plant, inputs), lambda tree: jax.tree.map(lambda leaf: leaf[None], tree)
+    inputs, lone = undelayed(plant, inputs), lambda tree: jax.tree.map(lambda leaf: leaf[None], tree)
     assumed = Assumed(
         variance, readings.wander, readings.colour, noise.velocity, start.covariance, readings.wandering,
         readings.coloured,

@@ -18,7 +18,7 @@ import scipy.linalg
 from jaxtyping import Array, Float
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
-from ..plant import InterpolatedInput, Observation, Plant, bucket, force_along, punctual, shifted
+from ..plant import InterpolatedInput, Observation, Plant, bucket, force_along, shifted, undelayed
 from ._kalman import LinearModel, log_likelihood, smoothed, swell_of
 
 _MEMORIES = (0.15, 1.0)
@@ -90,7 +90,7 @@ def latent_force(
     padded = min(bucket(n), inputs.time.shape[0])  # nothing is read where it is filled up
     values, use = (np.pad(np.asarray(q), ((0, padded - n), (0, 0))) for q in (values, use))
     base = np.asarray(inputs.base)[:padded]
-    true = (np.asarray(punctual(plant, inputs).force)[:padded] - np.asarray(plant.force_offset)) / (
+    true = (np.asarray(undelayed(plant, inputs).force)[:padded] - np.asarray(plant.force_offset)) / (
         1 + np.asarray(plant.force_gain)
     )
     true = true - base[..., None] * np.asarray(plant.mass).sum(1)

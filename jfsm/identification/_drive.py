@@ -14,7 +14,7 @@ def between_samples(force: np.ndarray, halves: int, count: int) -> np.ndarray:
     return begin + share * (end - begin)
 
 
-def punctual_force(force: np.ndarray, delay: np.ndarray) -> np.ndarray:
+def undelayed_force(force: np.ndarray, delay: np.ndarray) -> np.ndarray:
     """Force (n, halves, dof) with the delays of its sensors undone, in samples: that of t is what is read later."""
     n, halves, dof = force.shape
     flat = _in_a_row(force)

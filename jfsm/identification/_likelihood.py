@@ -23,7 +23,7 @@ from jaxtyping import Array, Bool, Float
 from ..estimation._filter import Assumed, Innovations, ProcessNoise, Readings, State, Stretch, begun, on_lanes, run
 from ..estimation._imposed import force_innovations
 from ..plant import Imposed, InterpolatedInput, Observation, Past, Plant, jit_with_kernels
-from ._drive import between_samples, forces_before, punctual_force
+from ._drive import between_samples, forces_before, undelayed_force
 from ._layout import place_of, with_vector, without_part
 
 SAMPLES = 1024
@@ -320,7 +320,7 @@ class _Drive(NamedTuple):
         force = before = None
         if plant.force_delay.size:
             delays = runs.numbers[:, place_of(plant, "force_delay")] / float(inputs.step)
-            force = _by_value(delays, lambda tau: punctual_force(np.asarray(inputs.force), tau)[:count], 2)
+            force = _by_value(delays, lambda tau: undelayed_force(np.asarray(inputs.force), tau)[:count], 2)
         if runs.push is not None:
             halves = inputs.force.shape[1]
             pushed = np.moveaxis(between_samples(runs.push, halves, count), 0, 2)

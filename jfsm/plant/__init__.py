@@ -25,13 +25,13 @@ from ._grid import begin as begin
 from ._grid import drive_before as drive_before
 from ._grid import free_run as free_run
 from ._grid import load_of as load_of
-from ._grid import punctual as punctual
 from ._grid import remember as remember
 from ._grid import run_again as run_again
 from ._grid import run_grid as run_grid
 from ._grid import run_strided as run_strided
 from ._grid import shifted as shifted
 from ._grid import true_force as true_force
+from ._grid import undelayed as undelayed
 from ._imposed import Imposed as Imposed
 from ._imposed import Path as Path
 from ._imposed import imposed_motion as imposed_motion

@@ -46,8 +46,8 @@ class InterpolatedInput(eqx.Module):
         return InterpolatedInput(jnp.asarray(force), jnp.asarray(base), jnp.asarray(time), jnp.asarray(step))
 
 
-def punctual(plant: Plant, inputs: InterpolatedInput) -> InterpolatedInput:
-    """What drives a run with the delay of its force sensor undone: the force of t is what is read at t + tau."""
+def undelayed(plant: Plant, inputs: InterpolatedInput) -> InterpolatedInput:
+    """Input of a run without the delay of its force sensor: the force at t is the reading at t + tau."""
     if not plant.force_delay.size:
         return inputs
     n, halves, dof = inputs.force.shape
@@ -234,7 +234,7 @@ def run_strided(plant: Plant, inputs: InterpolatedInput, stride, x0: Float[Array
     Nothing may answer the past.
     """
     minv = inverse_mass(plant)
-    inputs = punctual(plant, inputs)
+    inputs = undelayed(plant, inputs)
     h = inputs.step / inputs.substeps * stride
 
     def body(motion, sample):
@@ -264,7 +264,7 @@ def run_again(plant: Plant, inputs: InterpolatedInput, x0: Float[Array, " dof"],
 def free_run(plant: Plant, inputs: InterpolatedInput, x0, v0, again: bool = False):
     """As `run_grid`, to be traced; as `run_again` if so asked."""
     minv = inverse_mass(plant)
-    inputs = punctual(plant, inputs)
+    inputs = undelayed(plant, inputs)
 
     def body(carry, sample):
         motion, past = carry
