@@ -27,11 +27,11 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..plant import (
+    DelayBuffer,
     InterpolatedInput,
     Load,
     Motion,
     Observation,
-    Past,
     Plant,
     acceleration,
     advance_sample,
@@ -145,7 +145,7 @@ class State(NamedTuple):
     v: Float[Array, " dof"]
     z: Float[Array, " hidden"]
     mode: Int[Array, " slots"]
-    past: Past
+    buffer: DelayBuffer
     covariance: Float[Array, "state state"]
     overrun: Float[Array, " slots"]
     zeros: Float[Array, " zeros"]
@@ -248,11 +248,11 @@ class Known(NamedTuple):
 
 def begun(plant: Plant, assumed: Assumed, x0, v0, force: Float[Array, "3 dof"], base: Float[Array, " 3"], time, step):
     """State of a lane before its first sample, which begins with these forces; hidden states are relaxed."""
-    motion, past = begin(
+    motion, buffer = begin(
         plant, inverse_mass(plant), x0, v0, InterpolatedInput(force[None], base[None], time[None], step)
     )
     beyond_doubt, zeros = jnp.full(len(plant.friction), _FAR), jnp.zeros(len(zeros_of(assumed)))
-    return State(*motion[:3], motion.mode.astype(int), past, assumed.begin(), beyond_doubt, zeros)
+    return State(*motion[:3], motion.mode.astype(int), buffer, assumed.begin(), beyond_doubt, zeros)
 
 
 def run(
@@ -294,11 +294,11 @@ def _sample(
     substeps = (base.size - 1) // 2
 
     def read(plant, known, state, force, before):
-        g = load_of(plant, known.minv, state.motion, state.past, force, base, now.time, dt)
+        g = load_of(plant, known.minv, state.motion, state.buffer, force, base, now.time, dt)
         load = Load(g[:3], base[:3], now.time, dt / substeps)
         return (*_read(plant, known, observation, of_zeros, state, load, before, now.values, now.use), g)
 
-    motion, updated, zeros, past, seen, g = each(read, known, states, force, now.before)
+    motion, updated, zeros, buffer, seen, g = each(read, known, states, force, now.before)
     after = _advanced(each, known, motion, g, base, now.time, dt)
 
     def carry_on(plant, known, motion, after, updated, g):
@@ -306,7 +306,7 @@ def _sample(
 
     covariance, overrun = each(carry_on, known, motion, after, updated, g)
     onward = each(lambda plant, known, zeros: jnp.sum(known.onward * zeros[None, :], 1), known, zeros)
-    return State(*after[:3], after.mode.astype(int), past, covariance, overrun, onward), seen
+    return State(*after[:3], after.mode.astype(int), buffer, covariance, overrun, onward), seen
 
 
 def _advanced(each: Lanes, known: Known, motion: Motion, g, base, time, dt) -> Motion:
@@ -335,7 +335,7 @@ def _advanced(each: Lanes, known: Known, motion: Motion, g, base, time, dt) -> M
 
 
 def _read(plant: Plant, known: Known, observation, of_zeros, state: State, load: Load, before, values, use):
-    """Motion, covariance, zeros and past of a lane once it has read a sample, and the innovations."""
+    """Motion, covariance, zeros and buffer of a lane once it has read a sample, and the innovations."""
     motion, dof, rows = state.motion, plant.dof, plant.friction.direction
     mean, updated, found = _update(
         plant, known.minv, observation, motion, state.zeros, of_zeros, state.covariance, state.overrun, load, before,
@@ -347,7 +347,7 @@ def _read(plant: Plant, known: Known, observation, of_zeros, state: State, load:
     still = (motion.mode == 0) & (pushed <= known.nothing)
     v = v - stopping(known.minv, rows, jnp.sum(rows * v[None, :], 1), still)
     moving = Motion(x, v, settle(plant, x, z), mode_at(plant, known.minv, x, v, z, load.force[0], load.time, still))
-    return moving, updated, zeros, remember(state.past, x, v), found
+    return moving, updated, zeros, remember(state.buffer, x, v), found
 
 
 def _carried_on(plant: Plant, known: Known, motion: Motion, after: Motion, updated, g, time, dt, substeps: int):

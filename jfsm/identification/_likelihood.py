@@ -22,7 +22,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..estimation._filter import Assumed, Innovations, ProcessNoise, Readings, State, Stretch, begun, on_lanes, run
 from ..estimation._imposed import force_innovations
-from ..plant import Imposed, InterpolatedInput, Observation, Past, Plant, jit_with_kernels
+from ..plant import DelayBuffer, Imposed, InterpolatedInput, Observation, Plant, jit_with_kernels
 from ._drive import between_samples, forces_before, undelayed_force
 from ._layout import place_of, with_vector, without_part
 
@@ -181,9 +181,9 @@ class Scene:
         dof, slots, reach = plant.dof, len(plant.friction), plant.reach if len(plant.delayed) else 0
         motion, zeros = 2 * dof + plant.hidden, 2 * len(readings.wandering) + len(readings.coloured)
         none: Callable[..., Any] = np.zeros
-        past = Past(none((RUNS, reach, dof)), none((RUNS, reach, dof)), none(RUNS, int))
+        buffer = DelayBuffer(none((RUNS, reach, dof)), none((RUNS, reach, dof)), none(RUNS, int))
         return jax.device_put(State(
-            none((RUNS, dof)), none((RUNS, dof)), none((RUNS, plant.hidden)), none((RUNS, slots), int), past,
+            none((RUNS, dof)), none((RUNS, dof)), none((RUNS, plant.hidden)), none((RUNS, slots), int), buffer,
             none((RUNS, motion + zeros, motion + zeros)), none((RUNS, slots)), none((RUNS, zeros)),
         ))  # fmt: skip
 

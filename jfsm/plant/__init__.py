@@ -18,8 +18,8 @@ from ._forces import hidden_rate as hidden_rate
 from ._forces import hidden_start as hidden_start
 from ._forces import settle as settle
 from ._forces import smooth_force as smooth_force
+from ._grid import DelayBuffer as DelayBuffer
 from ._grid import InterpolatedInput as InterpolatedInput
-from ._grid import Past as Past
 from ._grid import advance_sample as advance_sample
 from ._grid import begin as begin
 from ._grid import drive_before as drive_before

@@ -99,10 +99,10 @@ def true_force(
     return measured - base[:, None] * inertia[None, :]
 
 
-class Past(NamedTuple):
-    """Displacement and velocity of the last samples, in a ring, and how many there have been.
+class DelayBuffer(NamedTuple):
+    """Ring buffer of the displacements and velocities of the last samples, and the number of samples so far.
 
-    Before the start the motion was the starting value. Empty where nothing answers the past.
+    Before the first sample the motion was at rest in the initial displacement. Empty if no force is delayed.
     """
 
     x: Float[Array, "reach dof"]
@@ -110,49 +110,54 @@ class Past(NamedTuple):
     count: Int[Array, ""]
 
 
-def no_past(plant: Plant, x0: Float[Array, " dof"]) -> Past:
-    """The past of a run that begins at `x0`."""
+def delay_buffer(plant: Plant, x0: Float[Array, " dof"]) -> DelayBuffer:
+    """Delay buffer of a run that begins at `x0`."""
     reach = plant.reach if len(plant.delayed) else 0
-    return Past(jnp.broadcast_to(x0[None, :], (reach, plant.dof)), jnp.zeros((reach, plant.dof)), jnp.zeros((), int))
+    return DelayBuffer(
+        jnp.broadcast_to(x0[None, :], (reach, plant.dof)), jnp.zeros((reach, plant.dof)), jnp.zeros((), int)
+    )
 
 
-def remember(past: Past, x: Float[Array, " dof"], v: Float[Array, " dof"], keep: Bool[Array, ""] | bool = True) -> Past:
-    """The past once another sample has gone by, if that is to be kept."""
-    if not past.x.size:
-        return past
-    here = past.count % past.x.shape[0]  # only this row changes, so that the others need not be copied
-    x, v = jnp.where(keep, x, past.x[here]), jnp.where(keep, v, past.v[here])
-    return Past(past.x.at[here].set(x), past.v.at[here].set(v), past.count + keep)
+def remember(
+    buffer: DelayBuffer, x: Float[Array, " dof"], v: Float[Array, " dof"], keep: Bool[Array, ""] | bool = True
+) -> DelayBuffer:
+    """Buffer with one sample more, if `keep`."""
+    if not buffer.x.size:
+        return buffer
+    here = buffer.count % buffer.x.shape[0]  # only this row changes, so that the others need not be copied
+    x, v = jnp.where(keep, x, buffer.x[here]), jnp.where(keep, v, buffer.v[here])
+    return DelayBuffer(buffer.x.at[here].set(x), buffer.v.at[here].set(v), buffer.count + keep)
 
 
-def delayed_force(plant: Plant, minv, motion: Motion, past: Past, g, time, step) -> Float[Array, "halves dof"]:
-    """Forces that answer the past, on the half steps of a sample; `g` (halves, dof) is what drives it.
+def delayed_force(plant: Plant, minv, motion: Motion, buffer: DelayBuffer, g, time, step) -> Float[Array, "halves dof"]:
+    """Delayed forces on the half steps of a sample; `g` (halves, dof) is its load.
 
-    The past is read by cubic Hermite interpolation between samples. What lies inside the present sample (a delay
-    shorter than it) is read off the parabola that the motion begins it with.
+    The buffer is read by cubic Hermite interpolation between samples. A delay shorter than a sample is read off the
+    parabola of the motion at the start of this sample.
     """
-    halves, reach = g.shape[0], past.x.shape[0]
+    halves, reach = g.shape[0], buffer.x.shape[0]
     a = acceleration(plant, minv, motion.x, motion.v, motion.z, motion.mode, g[0], time)[0]
     ahead = jnp.linspace(0.0, 1.0, halves)
     slots, total = plant.delayed, jnp.zeros(g.shape)
 
     def before(k: Int[Array, " halves"], now, ring) -> Float[Array, "halves dof"]:
         """Values so many samples ago."""
-        return jnp.where((k == 0)[:, None], now[None, :], ring[(past.count - k) % reach])
+        return jnp.where((k == 0)[:, None], now[None, :], ring[(buffer.count - k) % reach])
 
     for i in range(len(slots)):
         lag = slots.choose(i, lambda law: law.delay) / step - ahead  # samples from each node towards the past
-        early, inside = (lag > past.count)[:, None], (lag < 0)[:, None]
+        early, inside = (lag > buffer.count)[:, None], (lag < 0)[:, None]
         k = jnp.clip(jnp.floor(lag).astype(int), 0, reach - 1)
         s = (lag - k)[:, None]
         (x, x_before), (v, v_before) = (
-            (before(k, now, ring), before(k + 1, now, ring)) for now, ring in ((motion.x, past.x), (motion.v, past.v))
+            (before(k, now, ring), before(k + 1, now, ring))
+            for now, ring in ((motion.x, buffer.x), (motion.v, buffer.v))
         )
         d_past = (1.0 + 2.0 * s) * (1.0 - s) ** 2 * x + (3.0 - 2.0 * s) * s**2 * x_before
         d_past = d_past + step * s * (1.0 - s) * (s * v_before - (1.0 - s) * v)
         w_past = 6.0 * s * (1.0 - s) / step * (x - x_before)
         w_past = w_past + (1.0 - s) * (1.0 - 3.0 * s) * v + s * (3.0 * s - 2.0) * v_before
-        d_past = jnp.where(early, past.x[past.count % reach][None, :], d_past)
+        d_past = jnp.where(early, buffer.x[buffer.count % reach][None, :], d_past)
         w_past = jnp.where(early, 0.0, w_past)
         ago = -lag[:, None] * step
         d_now = motion.x[None, :] + ago * motion.v[None, :] + ago**2 / 2 * a[None, :]
@@ -189,10 +194,12 @@ def _late_force(plant: Plant, slot: int, d, w, times):
     return plant.delayed.choose(slot, along)
 
 
-def load_of(plant: Plant, minv, motion: Motion, past: Past, force, base, time, step) -> Float[Array, "halves dof"]:
+def load_of(
+    plant: Plant, minv, motion: Motion, buffer: DelayBuffer, force, base, time, step
+) -> Float[Array, "halves dof"]:
     """What drives a sample's motion (2 substeps + 1, dof): the true force, less what answers the past."""
     g = true_force(plant, force, base)
-    return g - delayed_force(plant, minv, motion, past, g, time, step) if len(plant.delayed) else g
+    return g - delayed_force(plant, minv, motion, buffer, g, time, step) if len(plant.delayed) else g
 
 
 def advance_sample(plant: Plant, minv, motion: Motion, force, base, time, step) -> Motion:
@@ -213,12 +220,12 @@ def advance_sample(plant: Plant, minv, motion: Motion, force, base, time, step) 
     return jax.lax.scan(body, motion, (forces, bases, jnp.arange(substeps)))[0]
 
 
-def begin(plant: Plant, minv, x0, v0, inputs: InterpolatedInput) -> tuple[Motion, Past]:
-    """Motion and past at the first sample; hidden states are relaxed."""
-    z0, past = hidden_start(plant, x0, v0), no_past(plant, x0)
+def begin(plant: Plant, minv, x0, v0, inputs: InterpolatedInput) -> tuple[Motion, DelayBuffer]:
+    """Motion and delay buffer at the first sample; hidden states are relaxed."""
+    z0, buffer = hidden_start(plant, x0, v0), delay_buffer(plant, x0)
     resting = Motion(x0, v0, z0, jnp.zeros(len(plant.friction)))
-    g = load_of(plant, minv, resting, past, inputs.force[0], inputs.base[0], inputs.time[0], inputs.step)[0]
-    return Motion(x0, v0, z0, mode_at(plant, minv, x0, v0, z0, g, inputs.time[0])), past
+    g = load_of(plant, minv, resting, buffer, inputs.force[0], inputs.base[0], inputs.time[0], inputs.step)[0]
+    return Motion(x0, v0, z0, mode_at(plant, minv, x0, v0, z0, g, inputs.time[0])), buffer
 
 
 @eqx.filter_jit
@@ -267,12 +274,12 @@ def free_run(plant: Plant, inputs: InterpolatedInput, x0, v0, again: bool = Fals
     inputs = undelayed(plant, inputs)
 
     def body(carry, sample):
-        motion, past = carry
+        motion, buffer = carry
         force, base, time = sample
-        g = load_of(plant, minv, motion, past, force, base, time, inputs.step)
+        g = load_of(plant, minv, motion, buffer, force, base, time, inputs.step)
         a = acceleration(plant, minv, motion.x, motion.v, motion.z, motion.mode, g[0], time)[0]
         after = advance_sample(plant, minv, motion, g, base, time, inputs.step)
-        return (after, remember(past, motion.x, motion.v)), (motion.x, motion.v, a)
+        return (after, remember(buffer, motion.x, motion.v)), (motion.x, motion.v, a)
 
     start = begin(plant, minv, x0, v0, inputs)
     steps = jax.checkpoint(body) if again else body
