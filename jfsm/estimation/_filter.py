@@ -47,7 +47,7 @@ from ..plant import (
     linearised,
     load_of,
     mode_at,
-    remember,
+    push,
     settle,
     stopping,
     through_events,
@@ -347,7 +347,7 @@ def _read(plant: Plant, known: Known, observation, of_zeros, state: State, load:
     still = (motion.mode == 0) & (pushed <= known.nothing)
     v = v - stopping(known.minv, rows, jnp.sum(rows * v[None, :], 1), still)
     moving = Motion(x, v, settle(plant, x, z), mode_at(plant, known.minv, x, v, z, load.force[0], load.time, still))
-    return moving, updated, zeros, remember(state.buffer, x, v), found
+    return moving, updated, zeros, push(state.buffer, x, v), found
 
 
 def _carried_on(plant: Plant, known: Known, motion: Motion, after: Motion, updated, g, time, dt, substeps: int):

@@ -25,7 +25,7 @@ from ._grid import begin as begin
 from ._grid import drive_before as drive_before
 from ._grid import free_run as free_run
 from ._grid import load_of as load_of
-from ._grid import remember as remember
+from ._grid import push as push
 from ._grid import run_again as run_again
 from ._grid import run_grid as run_grid
 from ._grid import run_strided as run_strided

@@ -118,7 +118,7 @@ def delay_buffer(plant: Plant, x0: Float[Array, " dof"]) -> DelayBuffer:
     )
 
 
-def remember(
+def push(
     buffer: DelayBuffer, x: Float[Array, " dof"], v: Float[Array, " dof"], keep: Bool[Array, ""] | bool = True
 ) -> DelayBuffer:
     """Buffer with one sample more, if `keep`."""
@@ -279,7 +279,7 @@ def free_run(plant: Plant, inputs: InterpolatedInput, x0, v0, again: bool = Fals
         g = load_of(plant, minv, motion, buffer, force, base, time, inputs.step)
         a = acceleration(plant, minv, motion.x, motion.v, motion.z, motion.mode, g[0], time)[0]
         after = advance_sample(plant, minv, motion, g, base, time, inputs.step)
-        return (after, remember(buffer, motion.x, motion.v)), (motion.x, motion.v, a)
+        return (after, push(buffer, motion.x, motion.v)), (motion.x, motion.v, a)
 
     start = begin(plant, minv, x0, v0, inputs)
     steps = jax.checkpoint(body) if again else body
