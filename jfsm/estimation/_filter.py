@@ -220,12 +220,12 @@ def on_lanes(plants: Plant) -> Lanes:
 
 
 class Known(NamedTuple):
-    """What a lane knows throughout besides its plant: the inverse mass, the channels' white noise variances, what a
-    sample makes of their zeros, the covariances that it adds to these and to the motion, and speeds that are none."""
+    """Constants of a lane besides its plant: the inverse mass, the channels' white noise variances, the transition of
+    their zeros by a sample, the covariances that it adds to these and to the motion, and speeds that are none."""
 
     minv: Float[Array, "dof dof"]
     variances: Float[Array, " channels"]
-    onward: Float[Array, "zeros zeros"]
+    transition: Float[Array, "zeros zeros"]
     stirred: Float[Array, "zeros zeros"]
     added: Float[Array, "motion motion"]
     nothing: Float[Array, " slots"]
@@ -305,8 +305,8 @@ def _sample(
         return _carried_on(plant, known, motion, after, updated, g[substeps], now.time, dt, substeps)
 
     covariance, overrun = each(carry_on, known, motion, after, updated, g)
-    onward = each(lambda plant, known, zeros: jnp.sum(known.onward * zeros[None, :], 1), known, zeros)
-    return State(*after[:3], after.mode.astype(int), buffer, covariance, overrun, onward), seen
+    zeros = each(lambda plant, known, zeros: jnp.sum(known.transition * zeros[None, :], 1), known, zeros)
+    return State(*after[:3], after.mode.astype(int), buffer, covariance, overrun, zeros), seen
 
 
 def _advanced(each: Lanes, known: Known, motion: Motion, g, base, time, dt) -> Motion:
@@ -354,7 +354,7 @@ def _carried_on(plant: Plant, known: Known, motion: Motion, after: Motion, updat
     """Covariance of a lane after a sample, and how surely links rest by then; `g` drives it halfway."""
     x, v, z = ((a + b) / 2 for a, b in zip(motion[:3], after[:3], strict=True))
     free, rates = linearised(plant, known.minv, x, v, z, g, time + dt / 2)
-    step = beside(_transition(plant, known.minv, motion, after, rates, dt, substeps), known.onward)
+    step = beside(_transition(plant, known.minv, motion, after, rates, dt, substeps), known.transition)
     moving = _product(_product(step, updated), step.T) + beside(known.added, known.stirred)
     slope = with_friction(plant, known.minv, x, v, motion.mode, free, time + dt / 2)[0]
     return _rest(plant, known.minv, moving, after.mode), _overrun(plant, motion, after, moving, slope, dt)

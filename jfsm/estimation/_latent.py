@@ -172,12 +172,12 @@ def _model(
     weight = (
         dt / (6 * substeps) * np.array([1.0 if j in (0, nodes - 1) else 4.0 if j % 2 else 2.0 for j in range(nodes)])
     )
-    onward = [np.eye(n)]
+    transitions = [np.eye(n)]
     short = scipy.linalg.expm(rate * dt / (nodes - 1))
     for _ in range(nodes - 1):
-        onward.append(onward[-1] @ short)
-    carried = weight[:, None, None] * (np.array(onward[::-1]) @ gain)
-    step = onward[-1]
+        transitions.append(transitions[-1] @ short)
+    carried = weight[:, None, None] * (np.array(transitions[::-1]) @ gain)
+    step = transitions[-1]
     mass = np.diag(np.asarray(plant.mass))
     noise = np.zeros((n, n))
     noise[dof : 2 * dof, dof : 2 * dof] = minv @ (force_covariance * dt**2) @ minv.T
