@@ -99,7 +99,7 @@ class ProcessNoise(eqx.Module):
     """Covariance (dof, dof) that every sample adds to that of the velocity; of the force, where motion is imposed.
 
     It is the same for all hypotheses: were it to follow a fitted mass or gain, a wrong hypothesis could buy itself
-    noise with it. For the same reason a mass that hangs on another is struck with that one.
+    noise with it. For the same reason an attached mass receives that of the mass it hangs on.
     """
 
     velocity: Float[Array, "dof dof"]
@@ -220,13 +220,13 @@ def on_lanes(plants: Plant) -> Lanes:
 
 
 class Known(NamedTuple):
-    """Constants of a lane besides its plant: the inverse mass, the channels' white noise variances, the transition of
-    their zeros by a sample, the covariances that it adds to these and to the motion, and speeds that are none."""
+    """Constants of a lane besides its plant: the inverse mass, the channels' white noise variances, the transition
+    and process noise of their zeros, the process noise that is `added` to the motion, and speeds that are none."""
 
     minv: Float[Array, "dof dof"]
     variances: Float[Array, " channels"]
     transition: Float[Array, "zeros zeros"]
-    stirred: Float[Array, "zeros zeros"]
+    process_noise: Float[Array, "zeros zeros"]
     added: Float[Array, "motion motion"]
     nothing: Float[Array, " slots"]
 
@@ -234,14 +234,14 @@ class Known(NamedTuple):
     def of(cls, plant: Plant, assumed: Assumed) -> "Known":
         picked, rows = jnp.array(assumed.coloured, dtype=int), plant.friction.direction
         memory, remembered = assumed.colour[:, 0], assumed.colour[:, 1] * assumed.variance[picked]
-        struck = jnp.concatenate([jnp.zeros((plant.dof, plant.dof)), jnp.eye(plant.dof), carried(plant)])
+        noise_input = jnp.concatenate([jnp.zeros((plant.dof, plant.dof)), jnp.eye(plant.dof), carried(plant)])
         speeds = jnp.sum(rows[:, :, None] * assumed.velocity[None] * rows[:, None, :], (1, 2))
         return cls(
             inverse_mass(plant),
             assumed.variance.at[picked].add(-remembered),
             beside(_ramps(len(assumed.wandering)), jnp.diag(memory)),
             beside(_about_slopes(assumed.wander[:, 1]), jnp.diag((1.0 - memory**2) * remembered)),
-            struck @ assumed.velocity @ struck.T,
+            noise_input @ assumed.velocity @ noise_input.T,
             _NOTHING * jnp.sqrt(speeds),
         )
 
@@ -355,7 +355,7 @@ def _carried_on(plant: Plant, known: Known, motion: Motion, after: Motion, updat
     x, v, z = ((a + b) / 2 for a, b in zip(motion[:3], after[:3], strict=True))
     free, rates = linearised(plant, known.minv, x, v, z, g, time + dt / 2)
     step = beside(_transition(plant, known.minv, motion, after, rates, dt, substeps), known.transition)
-    moving = _product(_product(step, updated), step.T) + beside(known.added, known.stirred)
+    moving = _product(_product(step, updated), step.T) + beside(known.added, known.process_noise)
     slope = with_friction(plant, known.minv, x, v, motion.mode, free, time + dt / 2)[0]
     return _rest(plant, known.minv, moving, after.mode), _overrun(plant, motion, after, moving, slope, dt)
 

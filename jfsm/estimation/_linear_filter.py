@@ -57,7 +57,7 @@ class Law(NamedTuple):
             beside(step, known.transition),
             jnp.pad(push, ((0, 0), (0, len(zeros)), (0, 0))),
             beside(transition(rates, dt, substeps), known.transition),
-            beside(known.added, known.stirred),
+            beside(known.added, known.process_noise),
             assumed.begin(),
             jnp.concatenate([gain[:, None] * rows, added_to.reshape(len(rows), len(zeros))], 1),
             driven[:, None] * (observation.select @ minv),
@@ -70,9 +70,9 @@ class Law(NamedTuple):
 def _runge_kutta(rates, minv, step, substeps: int):
     """What the Runge-Kutta steps of a sample make of the state, and of the forces on their half steps."""
     dof, one, exponent = minv.shape[0], jnp.eye(rates.shape[0]), step * rates
-    square, struck = exponent @ exponent, step / 6 * jnp.concatenate([jnp.zeros((dof, dof)), minv])
+    square, by_force = exponent @ exponent, step / 6 * jnp.concatenate([jnp.zeros((dof, dof)), minv])
     first, middle = one + exponent + square / 2 + square @ exponent / 4, 4 * one + 2 * exponent + square / 2
-    nodes = jnp.stack([first @ struck, middle @ struck, struck])
+    nodes = jnp.stack([first @ by_force, middle @ by_force, by_force])
     along = short_transition(exponent)
     whole, after = jax.lax.scan(lambda power, _: (along @ power, power), one, length=substeps)
     pushes = after[::-1, None] @ nodes[None]  # of each step, by what the steps after it make of it

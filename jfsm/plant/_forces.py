@@ -46,7 +46,7 @@ def hidden_rate(plant: Plant, x: State, v: State, z: Hidden, t: Float[Array, ""]
 
 
 def carried(plant: Plant) -> Float[Array, "hidden dof"]:
-    """Change of the hidden states with that of the velocities where masses are struck: what hangs on one goes along, as
+    """Change of the hidden states per jump of the velocities: an attached mass jumps with the mass that carries it, as
     it does with the base."""
     slots, known = plant.memory, np.zeros((len(plant.memory.laws), hidden_width(plant.memory)))
     for row, law in zip(known, slots.laws, strict=True):
