@@ -1,4 +1,10 @@
-"""What moves: a structure lowered to arrays, its forces, its step, and the drive of a run."""
+"""What moves: a structure lowered to arrays, its forces, its step, and the drive of a run.
+
+`lower` makes a `Plant` of a structure, `observation_of` the response channels of its state, `excitation` the
+`InterpolatedInput` of a record, and `starting_state` its initial state. `run_grid` integrates the motion; the functions
+of one step and one sample serve filters. `imposed_motion` and `force_needed` are for records whose motion is imposed,
+`force_along` and `forces_of_law` for forces along a known motion.
+"""
 
 from ._along import HIDDEN_SUBSTEPS as HIDDEN_SUBSTEPS
 from ._along import force_along as force_along

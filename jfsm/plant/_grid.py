@@ -170,7 +170,7 @@ def delayed_force(plant: Plant, minv, motion: Motion, buffer: DelayBuffer, g, ti
 
 
 def delayed_along(plant: Plant, x, v, time) -> Float[Array, "n dof"]:
-    """Forces that answer the past along a given motion (n, dof), which stood still before it began."""
+    """Delayed forces along a given motion (n, dof), at rest before its first sample."""
     n, step, slots = x.shape[0], time[1] - time[0], plant.delayed
     total = jnp.zeros(x.shape)
     for i in range(len(slots)):
@@ -197,7 +197,7 @@ def _late_force(plant: Plant, slot: int, d, w, times):
 def load_of(
     plant: Plant, minv, motion: Motion, buffer: DelayBuffer, force, base, time, step
 ) -> Float[Array, "halves dof"]:
-    """What drives a sample's motion (2 substeps + 1, dof): the true force, less what answers the past."""
+    """Load of a sample on half steps (2 substeps + 1, dof): the true force, less the delayed forces."""
     g = true_force(plant, force, base)
     return g - delayed_force(plant, minv, motion, buffer, g, time, step) if len(plant.delayed) else g
 
@@ -238,7 +238,7 @@ def run_grid(plant: Plant, inputs: InterpolatedInput, x0: Float[Array, " dof"], 
 def run_strided(plant: Plant, inputs: InterpolatedInput, stride, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
     """As `run_grid`, in steps `stride` times as long; the same program whatever the stride.
 
-    Nothing may answer the past.
+    The plant must have no delayed forces.
     """
     minv = inverse_mass(plant)
     inputs = undelayed(plant, inputs)
@@ -264,12 +264,12 @@ def run_strided(plant: Plant, inputs: InterpolatedInput, stride, x0: Float[Array
 
 @eqx.filter_jit
 def run_again(plant: Plant, inputs: InterpolatedInput, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
-    """As `run_grid`, for derivatives backwards: the inside of a step is gone through again and not kept."""
+    """As `run_grid`, for reverse-mode derivatives: each sample is computed again instead of stored."""
     return free_run(plant, inputs, x0, v0, again=True)
 
 
 def free_run(plant: Plant, inputs: InterpolatedInput, x0, v0, again: bool = False):
-    """As `run_grid`, to be traced; as `run_again` if so asked."""
+    """As `run_grid`, to be traced; as `run_again` if `again`."""
     minv = inverse_mass(plant)
     inputs = undelayed(plant, inputs)
 

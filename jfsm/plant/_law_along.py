@@ -1,8 +1,8 @@
 """The forces of one law along a given motion of its link, for many sets of its numbers.
 
-A law that has no hidden states answers every instant by itself: one program of one size serves all of a table and every
-record, and a number chooses among them. So it does for laws with hidden states, which are a loop over samples, whatever
-steps they need.
+A law without hidden states is evaluated at each instant independently: one program of one size serves all laws of a
+table and every record, and a number chooses the law. Laws with hidden states have one program too, a loop over samples
+with any number of steps.
 """
 
 from collections.abc import Callable

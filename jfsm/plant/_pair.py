@@ -1,4 +1,4 @@
-"""Whether a record and a structure belong together."""
+"""Check of a record against the structure that it is to be simulated or fitted with."""
 
 import numpy as np
 
@@ -8,7 +8,13 @@ from ..structures import Structure
 
 
 def check_pair(model: Structure, record: Record, *, imposed: bool = False) -> None:
-    """Refuse a record and a structure that do not belong together; `imposed` motions only where they are understood."""
+    """Refuse a record that does not fit the structure, or has an imposed motion, unless `imposed` allows that.
+
+    Raises
+    ------
+    ValueError
+        If the record is too short, names more degrees of freedom, or is driven by a motion; if a mass is zero.
+    """
     if len(record) < 2:
         raise ValueError(f"`record` must hold at least 2 samples; it has {len(record)}.")
     if record.dofs > model.dof:

@@ -1,4 +1,4 @@
-"""The state from which a free run begins."""
+"""Initial state of a free run."""
 
 from functools import partial
 from typing import Any
@@ -30,7 +30,7 @@ def starting_state(
     """Displacement and velocity (dof,) at the first sample.
 
     In this order: `initial_state`; rest if the record says so; least squares of the structure over the first `window`
-    samples of whatever response there is (Gauss-Newton with a Levenberg-Marquardt guard, every channel divided by its
+    samples of the response (Gauss-Newton with a Levenberg-Marquardt guard, every channel divided by its
     spread); rest.
     """
     dof = model.dof
@@ -77,7 +77,7 @@ def _least_squares(model: Structure, head: Record, reconstruction: Reconstructio
 
 
 def _rests(model: Structure, channels: tuple[Channel, ...]) -> list[np.ndarray]:
-    """States of rest away from zero, of masses that a law holds there and whose displacement is not measured."""
+    """Equilibria away from zero, of masses whose displacement is not measured."""
     grounded = [(max(at), rest) for at, rest in model.rests() if min(at) == 0]
     unseen = [(j, rest) for j, rest in grounded if ("displacement", j) not in channels]
     return [np.where(np.arange(2 * model.dof) == j - 1, rest, 0.0) for j, rest in unseen]
@@ -122,13 +122,13 @@ def _residuals(plant, observation, inputs, y, spread, counted, state):
         shown = {"displacement": x, "velocity": v, "acceleration": a + inputs.base[:, :1]}
         rows = zip(observation.kinds, observation.select, strict=True)
         seen = jnp.stack([shown[kind] @ row for kind, row in rows], 1)
-        told = jnp.broadcast_to(counted[:, None] > 0, seen.shape)
+        used = jnp.broadcast_to(counted[:, None] > 0, seen.shape)
         for tau, channel in zip(plant.channel_delay / inputs.step, plant.late_channel, strict=True):
             seen = seen.at[:, channel].set(shifted(seen[:, channel], -tau))
-            then = jnp.arange(counted.size) - tau  # what was before the record no state at its start tells
-            told = told.at[:, channel].set(told[:, channel] & (then >= 0) & (then <= jnp.sum(counted) - 1))
+            then = jnp.arange(counted.size) - tau  # earlier readings do not depend on the state at the start
+            used = used.at[:, channel].set(used[:, channel] & (then >= 0) & (then <= jnp.sum(counted) - 1))
         shown_by_sensors = (1 + plant.channel_gain)[None, :] * seen + plant.channel_offset[None, :]
-        return jnp.where(told, (shown_by_sensors - y) / spread[None, :], 0.0).ravel()
+        return jnp.where(used, (shown_by_sensors - y) / spread[None, :], 0.0).ravel()
 
     jacobian = jax.vmap(partial(jax.jvp, residual, (state,)), out_axes=(None, 1))
     value, slope = jacobian((jnp.eye(2 * dof),))
