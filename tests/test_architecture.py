@@ -22,6 +22,7 @@ ROOMS = (
     "records",
     "structures",
     "surrogates",
+    "plant",
     "dynamics",
     "estimation",
     "identification",
@@ -32,6 +33,9 @@ ROOMS = (
     "paper",
     "cli",
 )
+
+# Rooms whose public face is all that other rooms may use.
+CLOSED = ("plant", "dynamics")
 
 
 def module_files(package: Path) -> dict[str, Path]:
@@ -92,6 +96,20 @@ def room_violations(package: Path) -> list[str]:
     return found
 
 
+def private_imports(package: Path) -> list[str]:
+    """Every import of a private module of a closed room by another room, as one line each."""
+    files = module_files(package)
+    found = []
+    for name, path in files.items():
+        own = name.split(".")[1:2]
+        for target, line in imported_modules(name, path, set(files), at_load=False):
+            room, inside = target.split(".")[1:2], target.split(".")[2:]
+            if set(room) & set(CLOSED) and room != own and any(part.startswith("_") for part in inside):
+                where = path.relative_to(package.parent)
+                found.append(f"{where}:{line} imports {target}; let `{room[0]}` export the name, and import that")
+    return found
+
+
 def import_cycle(package: Path) -> list[str] | None:
     """Modules that import each other while being loaded, or None."""
     files = module_files(package)
@@ -126,6 +144,10 @@ def test_a_room_imports_only_rooms_listed_above_it():
     assert not room_violations(PACKAGE), "\n".join(room_violations(PACKAGE))
 
 
+def test_no_room_imports_a_private_module_of_a_closed_room():
+    assert not private_imports(PACKAGE), "\n".join(private_imports(PACKAGE))
+
+
 def test_no_modules_import_each_other_in_a_circle():
     assert import_cycle(PACKAGE) is None
 
@@ -154,6 +176,33 @@ def test_an_import_from_a_lower_room_is_seen_however_it_is_written(tmp_path, sta
     )
     (violation,) = room_violations(package)
     assert violation.startswith("jfsm/records/_record.py:")
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "from ..plant._stepper import advance",
+        "from ..plant import _stepper",
+        "import jfsm.plant._stepper",
+        "from jfsm.plant._stepper import advance",
+        "def late():\n    from ..plant._stepper import advance",
+    ],
+)
+def test_an_import_of_a_private_module_is_seen_however_it_is_written(tmp_path, statement):
+    package = build_package(
+        tmp_path,
+        {
+            "__init__.py": "",
+            "plant/__init__.py": "from ._stepper import advance as advance",
+            "plant/_stepper.py": "def advance(): ...",
+            "plant/_grid.py": "from ._stepper import advance",
+            "estimation/__init__.py": "",
+            "estimation/_filter.py": statement,
+            "estimation/_motion.py": "from ..plant import advance",
+        },
+    )
+    (violation,) = private_imports(package)
+    assert violation.startswith("jfsm/estimation/_filter.py:")
 
 
 def test_a_module_outside_every_room_is_seen(tmp_path):

@@ -61,7 +61,7 @@ def test_programs_are_those_of_a_few_classes_of_laws_whatever_the_place(shaken):
         for begin in candidate.starts[:LANES]:
             seen = shaken.resolving([begin])
             posterior = Posterior(hypothesis(CHAIN, [begin], [seen]), [seen])
-            needed.setdefault((posterior.program, seen.fine.substeps), set()).add(candidate.effects[0].cause.id)
+            needed.setdefault((posterior.program, seen.inputs.substeps), set()).add(candidate.effects[0].cause.id)
     shared = {name for names in needed.values() if len(names) > 1 for name in names}
     assert shared > {"cubic_hardening", "force_gain", "coulomb", "stribeck", "jenkins", "bouc_wen"}
     by_class = {program for program, _ in needed}

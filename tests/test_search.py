@@ -271,7 +271,7 @@ def found_beside_friction(records: Any, *parts: Any, cause: str) -> Any:
         theta=theta,
         evidence=0.0,
         covariance=1e-6 * np.eye(theta.size),
-        steps=tuple(n.fine.substeps for n in records),
+        steps=tuple(n.inputs.substeps for n in records),
     )
 
 
@@ -316,9 +316,9 @@ def test_a_number_with_which_the_motion_runs_away_says_nothing_of_what_a_force_w
 def test_a_trial_is_looked_at_in_steps_no_longer_than_those_it_was_fitted_in(with_friction, fitted):
     records = with_friction.records
     _, refitted = fitted
-    assert refitted.steps == (records[0].fine.substeps,)
-    finer = replace(refitted, steps=(4 * records[0].fine.substeps,))
-    assert with_friction.posterior_of(finer).records[0].fine.substeps == finer.steps[0]
+    assert refitted.steps == (records[0].inputs.substeps,)
+    finer = replace(refitted, steps=(4 * records[0].inputs.substeps,))
+    assert with_friction.posterior_of(finer).records[0].inputs.substeps == finer.steps[0]
     assert with_friction.posterior_of(replace(refitted, steps=(1,))).records[0] is records[0]
 
 

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.dynamics._forces import smooth_force
-from jfsm.dynamics._plant import direction, lower
+from jfsm.plant import direction, lower, smooth_force
 from jfsm.structures import AbstractTerm, AccelerationGain, ForceGain, MapTerm, Offset
 from jfsm.structures.terms import TERMS
 from jfsm.surrogates import tabulate

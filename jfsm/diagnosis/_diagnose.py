@@ -8,7 +8,7 @@ import jax
 from .._limit import Limit, ended_by_interrupt
 from .._programs import programs_kept
 from .._types import require_x64
-from ..dynamics import Reconstruction
+from ..plant import Reconstruction
 from ..records import Record
 from ..reporting import shown_by_default
 from ..structures import Cause, Structure

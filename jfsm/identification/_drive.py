@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..dynamics._grid import Fine
+from ..plant import InterpolatedInput
 
 
 def between_samples(force: np.ndarray, halves: int, count: int) -> np.ndarray:
@@ -14,7 +14,7 @@ def between_samples(force: np.ndarray, halves: int, count: int) -> np.ndarray:
     return begin + share * (end - begin)
 
 
-def punctual_force(force: np.ndarray, delay: np.ndarray) -> np.ndarray:
+def undelayed_force(force: np.ndarray, delay: np.ndarray) -> np.ndarray:
     """Force (n, halves, dof) with the delays of its sensors undone, in samples: that of t is what is read later."""
     n, halves, dof = force.shape
     flat = _in_a_row(force)
@@ -22,12 +22,12 @@ def punctual_force(force: np.ndarray, delay: np.ndarray) -> np.ndarray:
     return later[np.arange(n)[:, None] * (halves - 1) + np.arange(halves)[None, :]]
 
 
-def forces_before(fine: Fine, tau: float) -> np.ndarray:
+def forces_before(inputs: InterpolatedInput, tau: float) -> np.ndarray:
     """Forces, and last the acceleration of the base, (n, 5, dof + 1), from each sample back to tau earlier."""
-    force, base = np.asarray(fine.force), np.asarray(fine.base)
+    force, base = np.asarray(inputs.force), np.asarray(inputs.base)
     n, halves, dof = force.shape
     flat = _in_a_row(np.concatenate([force, base[..., None]], 2))
-    places = -tau / float(fine.step) * (halves - 1) * np.linspace(0.0, 1.0, 5)
+    places = -tau / float(inputs.step) * (halves - 1) * np.linspace(0.0, 1.0, 5)
     earlier = [[_shifted(flat[:, j], place) for place in places] for j in range(dof + 1)]
     return np.array(earlier).transpose(2, 1, 0)[: n * (halves - 1) : halves - 1]
 

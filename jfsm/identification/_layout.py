@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..dynamics._plant import Channel, Plant, numbers_of
+from ..plant import Channel, Plant, numbers_of
 from ..structures import Structure
 
 _PARTS = (

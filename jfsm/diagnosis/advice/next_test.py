@@ -19,8 +19,8 @@ import numpy as np
 from ..._result import Result
 from ..._threads import side_by_side
 from ...dynamics import simulate
-from ...dynamics._law_along import force_at
 from ...identification import LADDER, Nuisances, approach, finish, lanes_of, prepare
+from ...plant import force_at
 from ...records import Record
 from ...structures import AbstractTerm, Structure
 from ..evidence.fitted import Trial

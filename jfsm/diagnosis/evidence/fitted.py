@@ -282,5 +282,5 @@ def trial(
         whiteness=whiteness(alone, theta),
         noise=scales,
         trusted=np.concatenate([n.trusted for n in posterior.records]),
-        steps=tuple(n.fine.substeps for n in posterior.records),
+        steps=tuple(n.inputs.substeps for n in posterior.records),
     )

@@ -14,8 +14,9 @@ import jax
 import numpy as np
 from scipy.signal import lfilter
 
-from ...dynamics import Reconstruction, simulate
+from ...dynamics import simulate
 from ...identification import Nuisances
+from ...plant import Reconstruction
 from ...records import Record, bridged, spikes
 from ...structures import Structure
 from ..channels.drift import steady

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...dynamics._plant import direction
 from ...identification import Posterior, missing_force
+from ...plant import direction
 from .fitted import Trial, free_run, runs_away
 from .score_test import moved, regressed
 from .scorecard import OtherShapes

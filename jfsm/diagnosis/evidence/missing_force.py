@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 
 from ..._types import evenly_taken
-from ...dynamics._law_along import force_at
-from ...dynamics._plant import direction
 from ...identification import Nuisances, missing_force
 from ...mapping.plot_data import GRID, shown_map, shown_points
+from ...plant import direction, force_at
 from ...structures import AbstractTerm, Structure
 from ...surrogates import RKPM, HermiteTable, tabulate
 from ..channels.drift import steadied

@@ -12,8 +12,8 @@ import jax
 import numpy as np
 
 from ..._threads import side_by_side
-from ...dynamics._grid import Fine
 from ...identification import Nuisances
+from ...plant import InterpolatedInput
 from ...records import Record
 from ...structures import Clipping
 from .excess import is_noise_only, white
@@ -83,8 +83,10 @@ def noise_levels(trial: Trial, nuisances: Nuisances, index: int = 0) -> dict[tup
 
 def _noisy(nuisances: Nuisances, run: np.ndarray, levels: dict[tuple, float], rng: np.random.Generator) -> Record:
     """The record of a run under what is taken to drive it, with fresh noise on every channel."""
-    assert isinstance(nuisances.fine, Fine)
-    force, base = (np.asarray(drive)[: nuisances.samples, 0] for drive in (nuisances.fine.force, nuisances.fine.base))
+    assert isinstance(nuisances.inputs, InterpolatedInput)
+    force, base = (
+        np.asarray(drive)[: nuisances.samples, 0] for drive in (nuisances.inputs.force, nuisances.inputs.base)
+    )
     truth = {**dict(zip(nuisances.channels, run.T, strict=True)), BASE: base}
     truth |= {channel: force[:, channel[1] - 1] for channel in nuisances.record.channels if channel[0] == "force"}
     return remeasured(nuisances.record, truth, levels, rng, nuisances.memories)

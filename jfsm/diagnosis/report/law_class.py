@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...dynamics._law_along import force_at
+from ...plant import force_at
 from ...structures import AbstractSensor, AbstractTerm, Cause
 from .force_shape import bent, growth
 

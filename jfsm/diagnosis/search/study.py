@@ -8,8 +8,8 @@ import jax
 import numpy as np
 
 from ..._limit import Limit
-from ...dynamics import Reconstruction
 from ...identification import prepare_all
+from ...plant import Reconstruction
 from ...records import Record
 from ...structures import Cause, Structure
 from ..channels.drift import PLAINLY, steadied, wandering

@@ -16,18 +16,18 @@ _KEPT = 40
 """Programs of a function that are kept, those used last: one of them takes up to fifty megabytes."""
 
 _OPTIONS = {"xla_backend_optimization_level": 1}
-"""On a processor. What LLVM does beyond that takes a quarter of the time of compiling, and gains none."""
+"""On a CPU. The further LLVM passes take a quarter of the compile time and make nothing faster."""
 
 _refused = False
-"""Whether this process has met a program that XLA does not make one kernel of."""
+"""Whether XLA has refused in this process to compile a program to one kernel."""
 
 
 def jit_with_kernels(function: Callable[..., Found]) -> Callable[..., Found]:
     """`jax.jit` of a function whose keyword `one_kernel` says whether its loops may be kernels.
 
     The first argument is hashable and part of the program, the others are trees of arrays. Programs that have not been
-    used for long are dropped. Which operations a kernel may hold differs between versions of XLA: after a first refusal
-    there are no more kernels.
+    used for long are dropped. The operations that a kernel may hold differ between versions of XLA: after a first
+    refusal there are no more kernels.
     """
     programs: OrderedDict[Hashable, Callable[..., Found]] = OrderedDict()
     lock = Lock()
@@ -48,7 +48,7 @@ def jit_with_kernels(function: Callable[..., Found]) -> Callable[..., Found]:
             try:
                 return compiled(static, *arguments, one_kernel=True)
             except jax.errors.JaxRuntimeError:
-                found = compiled(static, *arguments, one_kernel=False)  # raises again what is no refusal
+                found = compiled(static, *arguments, one_kernel=False)  # any other error is raised again
                 _refused = True
                 return found
         return compiled(static, *arguments, one_kernel=False)
@@ -83,7 +83,7 @@ def as_one_kernel(loop: Callable[..., Found]) -> Callable[..., Found]:
             shape[:] = [jax.tree.map(lambda leaf: jax.ShapeDtypeStruct(leaf.shape, leaf.dtype), outcome)]
             return [leaf for leaf in jax.tree.leaves(outcome) if leaf.size]
 
-        # The attributes belong to the call, not to what is inside: a tagged result tags the operation that it comes
+        # The attributes belong to the call, not to its body: a tagged result tags the operation that it comes
         # from. An empty array has no place in a kernel.
         full = jax.jit(on_full)([leaf for leaf in leaves if leaf.size])
         tagged: Any = set_xla_metadata(full, inlineable="false", xla_cpu_small_call="true")

@@ -14,11 +14,11 @@ from ._plant import Plant
 from ._stepper import Load, Motion, acceleration, advance, inverse_mass, mode_at
 
 
-class Fine(eqx.Module):
-    """What drives a run between consecutive samples: forces on half steps.
+class InterpolatedInput(eqx.Module):
+    """Input of a run between consecutive samples, on half steps.
 
-    `force` (n, 2 substeps + 1, dof) belongs to the interval after each sample, `base` (n, 2 substeps + 1) is the
-    acceleration of the base.
+    `force` (n, 2 substeps + 1, dof) holds the applied forces of the interval after each sample, `base`
+    (n, 2 substeps + 1) the acceleration of the base.
     """
 
     force: Float[Array, "n halves dof"]
@@ -30,8 +30,8 @@ class Fine(eqx.Module):
     def substeps(self) -> int:
         return (self.force.shape[1] - 1) // 2
 
-    def by_steps(self, stride: int = 1, length: int | None = None) -> "Fine":
-        """The same drive with every `stride` steps a sample of one step, padded to `length` of these."""
+    def by_steps(self, stride: int = 1, length: int | None = None) -> "InterpolatedInput":
+        """The same input with every `stride` steps a sample of one step, padded to `length` of these."""
         n, count = self.force.shape[0], self.substeps // stride
         nodes = 2 * stride * np.arange(count)[:, None] + stride * np.arange(3)[None, :]
         given: Any = (self.force, self.base, self.time[0], self.step)
@@ -43,26 +43,28 @@ class Fine(eqx.Module):
             xp = jnp if is_traced(force) else np
             force, base = (xp.concatenate([q, xp.broadcast_to(q[-1:], (more, *q.shape[1:]))]) for q in (force, base))
         time = begin + step * np.arange(n * count + max(more, 0))
-        return Fine(jnp.asarray(force), jnp.asarray(base), jnp.asarray(time), jnp.asarray(step))
+        return InterpolatedInput(jnp.asarray(force), jnp.asarray(base), jnp.asarray(time), jnp.asarray(step))
 
 
-def punctual(plant: Plant, fine: Fine) -> Fine:
-    """What drives a run with the delay of its force sensor undone: the force of t is what is read at t + tau."""
+def undelayed(plant: Plant, inputs: InterpolatedInput) -> InterpolatedInput:
+    """Input of a run without the delay of its force sensor: the force at t is the reading at t + tau."""
     if not plant.force_delay.size:
-        return fine
-    n, halves, dof = fine.force.shape
-    flat = _in_a_row(fine.force)
-    columns = [shifted(flat[:, j], plant.force_delay[j] / fine.step * (halves - 1)) for j in range(dof)]
+        return inputs
+    n, halves, dof = inputs.force.shape
+    flat = _in_a_row(inputs.force)
+    columns = [shifted(flat[:, j], plant.force_delay[j] / inputs.step * (halves - 1)) for j in range(dof)]
     later = jnp.stack(columns, 1)
     take = jnp.arange(n)[:, None] * (halves - 1) + jnp.arange(halves)[None, :]
-    return Fine(later[take], fine.base, fine.time, fine.step)
+    return InterpolatedInput(later[take], inputs.base, inputs.time, inputs.step)
 
 
-def drive_before(fine: Fine, tau: Float[Array, ""]) -> tuple[Float[Array, "n 5 dof"], Float[Array, "n 5"]]:
+def drive_before(
+    inputs: InterpolatedInput, tau: Float[Array, ""]
+) -> tuple[Float[Array, "n 5 dof"], Float[Array, "n 5"]]:
     """Forces, and accelerations of the base, from each sample back to tau earlier: two steps in time, on half steps."""
-    n, halves, dof = fine.force.shape
-    flat = _in_a_row(jnp.concatenate([fine.force, fine.base[..., None]], 2))
-    places = -tau / fine.step * (halves - 1) * jnp.linspace(0.0, 1.0, 5)
+    n, halves, dof = inputs.force.shape
+    flat = _in_a_row(jnp.concatenate([inputs.force, inputs.base[..., None]], 2))
+    places = -tau / inputs.step * (halves - 1) * jnp.linspace(0.0, 1.0, 5)
     earlier = jax.vmap(jax.vmap(shifted, (1, None), 1), (None, 0), 1)(flat, places)[: n * (halves - 1) : halves - 1]
     return earlier[..., :dof], earlier[..., dof]
 
@@ -97,10 +99,10 @@ def true_force(
     return measured - base[:, None] * inertia[None, :]
 
 
-class Past(NamedTuple):
-    """Displacement and velocity of the last samples, in a ring, and how many there have been.
+class DelayBuffer(NamedTuple):
+    """Ring buffer of the displacements and velocities of the last samples, and the number of samples so far.
 
-    Before the start the motion was the starting value. Empty where nothing answers the past.
+    Before the first sample the motion was at rest in the initial displacement. Empty if no force is delayed.
     """
 
     x: Float[Array, "reach dof"]
@@ -108,49 +110,54 @@ class Past(NamedTuple):
     count: Int[Array, ""]
 
 
-def no_past(plant: Plant, x0: Float[Array, " dof"]) -> Past:
-    """The past of a run that begins at `x0`."""
+def delay_buffer(plant: Plant, x0: Float[Array, " dof"]) -> DelayBuffer:
+    """Delay buffer of a run that begins at `x0`."""
     reach = plant.reach if len(plant.delayed) else 0
-    return Past(jnp.broadcast_to(x0[None, :], (reach, plant.dof)), jnp.zeros((reach, plant.dof)), jnp.zeros((), int))
+    return DelayBuffer(
+        jnp.broadcast_to(x0[None, :], (reach, plant.dof)), jnp.zeros((reach, plant.dof)), jnp.zeros((), int)
+    )
 
 
-def remember(past: Past, x: Float[Array, " dof"], v: Float[Array, " dof"], keep: Bool[Array, ""] | bool = True) -> Past:
-    """The past once another sample has gone by, if that is to be kept."""
-    if not past.x.size:
-        return past
-    here = past.count % past.x.shape[0]  # only this row changes, so that the others need not be copied
-    x, v = jnp.where(keep, x, past.x[here]), jnp.where(keep, v, past.v[here])
-    return Past(past.x.at[here].set(x), past.v.at[here].set(v), past.count + keep)
+def push(
+    buffer: DelayBuffer, x: Float[Array, " dof"], v: Float[Array, " dof"], keep: Bool[Array, ""] | bool = True
+) -> DelayBuffer:
+    """Buffer with one sample more, if `keep`."""
+    if not buffer.x.size:
+        return buffer
+    here = buffer.count % buffer.x.shape[0]  # only this row changes, so that the others need not be copied
+    x, v = jnp.where(keep, x, buffer.x[here]), jnp.where(keep, v, buffer.v[here])
+    return DelayBuffer(buffer.x.at[here].set(x), buffer.v.at[here].set(v), buffer.count + keep)
 
 
-def delayed_force(plant: Plant, minv, motion: Motion, past: Past, g, time, step) -> Float[Array, "halves dof"]:
-    """Forces that answer the past, on the half steps of a sample; `g` (halves, dof) is what drives it.
+def delayed_force(plant: Plant, minv, motion: Motion, buffer: DelayBuffer, g, time, step) -> Float[Array, "halves dof"]:
+    """Delayed forces on the half steps of a sample; `g` (halves, dof) is its load.
 
-    The past is read by cubic Hermite interpolation between samples. What lies inside the present sample (a delay
-    shorter than it) is read off the parabola that the motion begins it with.
+    The buffer is read by cubic Hermite interpolation between samples. A delay shorter than a sample is read off the
+    parabola of the motion at the start of this sample.
     """
-    halves, reach = g.shape[0], past.x.shape[0]
+    halves, reach = g.shape[0], buffer.x.shape[0]
     a = acceleration(plant, minv, motion.x, motion.v, motion.z, motion.mode, g[0], time)[0]
     ahead = jnp.linspace(0.0, 1.0, halves)
     slots, total = plant.delayed, jnp.zeros(g.shape)
 
     def before(k: Int[Array, " halves"], now, ring) -> Float[Array, "halves dof"]:
         """Values so many samples ago."""
-        return jnp.where((k == 0)[:, None], now[None, :], ring[(past.count - k) % reach])
+        return jnp.where((k == 0)[:, None], now[None, :], ring[(buffer.count - k) % reach])
 
     for i in range(len(slots)):
         lag = slots.choose(i, lambda law: law.delay) / step - ahead  # samples from each node towards the past
-        early, inside = (lag > past.count)[:, None], (lag < 0)[:, None]
+        early, inside = (lag > buffer.count)[:, None], (lag < 0)[:, None]
         k = jnp.clip(jnp.floor(lag).astype(int), 0, reach - 1)
         s = (lag - k)[:, None]
         (x, x_before), (v, v_before) = (
-            (before(k, now, ring), before(k + 1, now, ring)) for now, ring in ((motion.x, past.x), (motion.v, past.v))
+            (before(k, now, ring), before(k + 1, now, ring))
+            for now, ring in ((motion.x, buffer.x), (motion.v, buffer.v))
         )
         d_past = (1.0 + 2.0 * s) * (1.0 - s) ** 2 * x + (3.0 - 2.0 * s) * s**2 * x_before
         d_past = d_past + step * s * (1.0 - s) * (s * v_before - (1.0 - s) * v)
         w_past = 6.0 * s * (1.0 - s) / step * (x - x_before)
         w_past = w_past + (1.0 - s) * (1.0 - 3.0 * s) * v + s * (3.0 * s - 2.0) * v_before
-        d_past = jnp.where(early, past.x[past.count % reach][None, :], d_past)
+        d_past = jnp.where(early, buffer.x[buffer.count % reach][None, :], d_past)
         w_past = jnp.where(early, 0.0, w_past)
         ago = -lag[:, None] * step
         d_now = motion.x[None, :] + ago * motion.v[None, :] + ago**2 / 2 * a[None, :]
@@ -163,7 +170,7 @@ def delayed_force(plant: Plant, minv, motion: Motion, past: Past, g, time, step)
 
 
 def delayed_along(plant: Plant, x, v, time) -> Float[Array, "n dof"]:
-    """Forces that answer the past along a given motion (n, dof), which stood still before it began."""
+    """Delayed forces along a given motion (n, dof), at rest before its first sample."""
     n, step, slots = x.shape[0], time[1] - time[0], plant.delayed
     total = jnp.zeros(x.shape)
     for i in range(len(slots)):
@@ -187,10 +194,12 @@ def _late_force(plant: Plant, slot: int, d, w, times):
     return plant.delayed.choose(slot, along)
 
 
-def load_of(plant: Plant, minv, motion: Motion, past: Past, force, base, time, step) -> Float[Array, "halves dof"]:
-    """What drives a sample's motion (2 substeps + 1, dof): the true force, less what answers the past."""
+def load_of(
+    plant: Plant, minv, motion: Motion, buffer: DelayBuffer, force, base, time, step
+) -> Float[Array, "halves dof"]:
+    """Load of a sample on half steps (2 substeps + 1, dof): the true force, less the delayed forces."""
     g = true_force(plant, force, base)
-    return g - delayed_force(plant, minv, motion, past, g, time, step) if len(plant.delayed) else g
+    return g - delayed_force(plant, minv, motion, buffer, g, time, step) if len(plant.delayed) else g
 
 
 def advance_sample(plant: Plant, minv, motion: Motion, force, base, time, step) -> Motion:
@@ -211,32 +220,32 @@ def advance_sample(plant: Plant, minv, motion: Motion, force, base, time, step) 
     return jax.lax.scan(body, motion, (forces, bases, jnp.arange(substeps)))[0]
 
 
-def begin(plant: Plant, minv, x0, v0, fine: Fine) -> tuple[Motion, Past]:
-    """Motion and past at the first sample; hidden states are relaxed."""
-    z0, past = hidden_start(plant, x0, v0), no_past(plant, x0)
+def begin(plant: Plant, minv, x0, v0, inputs: InterpolatedInput) -> tuple[Motion, DelayBuffer]:
+    """Motion and delay buffer at the first sample; hidden states are relaxed."""
+    z0, buffer = hidden_start(plant, x0, v0), delay_buffer(plant, x0)
     resting = Motion(x0, v0, z0, jnp.zeros(len(plant.friction)))
-    g = load_of(plant, minv, resting, past, fine.force[0], fine.base[0], fine.time[0], fine.step)[0]
-    return Motion(x0, v0, z0, mode_at(plant, minv, x0, v0, z0, g, fine.time[0])), past
+    g = load_of(plant, minv, resting, buffer, inputs.force[0], inputs.base[0], inputs.time[0], inputs.step)[0]
+    return Motion(x0, v0, z0, mode_at(plant, minv, x0, v0, z0, g, inputs.time[0])), buffer
 
 
 @eqx.filter_jit
-def run_grid(plant: Plant, fine: Fine, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
+def run_grid(plant: Plant, inputs: InterpolatedInput, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
     """Displacement, velocity and acceleration (relative to the base) at every sample, each (n, dof)."""
-    return free_run(plant, fine, x0, v0)
+    return free_run(plant, inputs, x0, v0)
 
 
 @eqx.filter_jit
-def run_strided(plant: Plant, fine: Fine, stride, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
+def run_strided(plant: Plant, inputs: InterpolatedInput, stride, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
     """As `run_grid`, in steps `stride` times as long; the same program whatever the stride.
 
-    Nothing may answer the past.
+    The plant must have no delayed forces.
     """
     minv = inverse_mass(plant)
-    fine = punctual(plant, fine)
-    h = fine.step / fine.substeps * stride
+    inputs = undelayed(plant, inputs)
+    h = inputs.step / inputs.substeps * stride
 
-    def body(motion, inputs):
-        force, base, time = inputs
+    def body(motion, sample):
+        force, base, time = sample
         g = true_force(plant, force, base)
         a = acceleration(plant, minv, motion.x, motion.v, motion.z, motion.mode, g[0], time)[0]
 
@@ -247,31 +256,31 @@ def run_strided(plant: Plant, fine: Fine, stride, x0: Float[Array, " dof"], v0: 
             )
             return advance(plant, minv, motion, Load(forces, bases, time + i * h, h))
 
-        return jax.lax.fori_loop(0, fine.substeps // stride, step, motion), (motion.x, motion.v, a)
+        return jax.lax.fori_loop(0, inputs.substeps // stride, step, motion), (motion.x, motion.v, a)
 
-    motion, _ = begin(plant, minv, x0, v0, fine)
-    return jax.lax.scan(body, motion, (fine.force, fine.base, fine.time))[1]
+    motion, _ = begin(plant, minv, x0, v0, inputs)
+    return jax.lax.scan(body, motion, (inputs.force, inputs.base, inputs.time))[1]
 
 
 @eqx.filter_jit
-def run_again(plant: Plant, fine: Fine, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
-    """As `run_grid`, for derivatives backwards: the inside of a step is gone through again and not kept."""
-    return free_run(plant, fine, x0, v0, again=True)
+def run_again(plant: Plant, inputs: InterpolatedInput, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
+    """As `run_grid`, for reverse-mode derivatives: each sample is computed again instead of stored."""
+    return free_run(plant, inputs, x0, v0, again=True)
 
 
-def free_run(plant: Plant, fine: Fine, x0, v0, again: bool = False):
-    """As `run_grid`, to be traced; as `run_again` if so asked."""
+def free_run(plant: Plant, inputs: InterpolatedInput, x0, v0, again: bool = False):
+    """As `run_grid`, to be traced; as `run_again` if `again`."""
     minv = inverse_mass(plant)
-    fine = punctual(plant, fine)
+    inputs = undelayed(plant, inputs)
 
-    def body(carry, inputs):
-        motion, past = carry
-        force, base, time = inputs
-        g = load_of(plant, minv, motion, past, force, base, time, fine.step)
+    def body(carry, sample):
+        motion, buffer = carry
+        force, base, time = sample
+        g = load_of(plant, minv, motion, buffer, force, base, time, inputs.step)
         a = acceleration(plant, minv, motion.x, motion.v, motion.z, motion.mode, g[0], time)[0]
-        after = advance_sample(plant, minv, motion, g, base, time, fine.step)
-        return (after, remember(past, motion.x, motion.v)), (motion.x, motion.v, a)
+        after = advance_sample(plant, minv, motion, g, base, time, inputs.step)
+        return (after, push(buffer, motion.x, motion.v)), (motion.x, motion.v, a)
 
-    start = begin(plant, minv, x0, v0, fine)
+    start = begin(plant, minv, x0, v0, inputs)
     steps = jax.checkpoint(body) if again else body
-    return jax.lax.scan(steps, start, (fine.force, fine.base, fine.time))[1]
+    return jax.lax.scan(steps, start, (inputs.force, inputs.base, inputs.time))[1]

@@ -10,9 +10,9 @@ from .._types import is_traced
 Reconstruction = Literal["band-limited", "linear", "hold"]
 
 _HALF_WIDTH = 32
-"""Samples on either side that a band-limited value is made of."""
+"""Samples on either side that a band-limited value depends on."""
 _KAISER_BETA = 14.0
-"""Stop band near -140 dB, clean up to 0.43 of the sample rate: what the window leaves out drives nothing."""
+"""Stop band near -140 dB, flat up to 0.43 of the sample rate; a force above that is taken to move nothing."""
 
 
 def reconstruct(samples: Any, factor: int, method: Reconstruction = "band-limited") -> Any:
@@ -53,7 +53,7 @@ def _between(padded: Any, share: float, width: int, n: int) -> Any:
         * np.i0(_KAISER_BETA * np.sqrt(np.maximum(0.0, 1 - (distance / width) ** 2)))
         / np.i0(_KAISER_BETA)
     )
-    taps /= taps.sum()  # a constant force stays what it is
+    taps /= taps.sum()  # a constant force is reproduced
     xp = jnp if is_traced(padded) else np
     columns = [xp.convolve(padded[:, j], taps[::-1], mode="valid")[1:n] for j in range(padded.shape[1])]
     return xp.stack(columns, 1)

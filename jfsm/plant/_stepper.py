@@ -2,9 +2,9 @@
 
 While every link either slides one way or sticks, the motion is smooth. So a step freezes that *mode* (+1, -1, or 0 for
 sticking), looks for the first instant at which a mode ends (a sliding speed passes zero, or the force that holds a
-sticking link passes its limit), steps to that instant, decides the next mode from the force needed to stick, and goes
-on. The number of such segments in a step is fixed, so that many runs go side by side. Hidden states take part in the
-Runge-Kutta steps, and are put back within their bounds at the end of each.
+sticking link passes its limit), steps to that instant, decides the next mode from the force needed to stick, and
+continues. The number of such segments in a step is fixed, so that many runs go side by side. Hidden states take part in
+the Runge-Kutta steps, and are put back within their bounds at the end of each.
 """
 
 from typing import NamedTuple
@@ -19,7 +19,7 @@ from ._plant import Plant
 _SEGMENTS = 3
 """Modes that one step may pass through: slide, stick, slide."""
 _SHARED = 1e-10
-"""Compliance of a sticking link beside the masses': links that close a loop, or lie side by side, share the load."""
+"""Compliance of a sticking link, as a share of that of the masses: links in a loop or in parallel share the load."""
 
 
 class Motion(NamedTuple):
@@ -121,7 +121,7 @@ def with_friction(plant: Plant, minv, x, v, mode, a, t):
 
 
 def mode_at(plant: Plant, minv, x, v, z, g, t, still: Array | bool = False):
-    """Mode of each friction slot in a state: the sign of its speed; at rest, whether it sticks or which way it goes.
+    """Mode of each friction slot in a state: the sign of its speed; at rest, 0 or the sign of its breakaway.
 
     Slots that are known to be `still` are at rest whatever rounding made of their speeds.
     """
@@ -133,7 +133,7 @@ def mode_at(plant: Plant, minv, x, v, z, g, t, still: Array | bool = False):
 
 def _from_rest(plant: Plant, minv, x, v, z, g, t, mode, broken):
     # Force needed to hold the links at rest while the others slide; beyond a limit a link breaks away. One that is
-    # known to have broken goes whichever way it is pulled: at the instant itself rounding decides about the limit.
+    # known to have broken follows the pull: at the instant itself rounding decides about the limit.
     rows, rest = plant.friction.direction, mode == 0
     low, high = friction_limits(plant, x, v, t)
     sliding = jnp.where(mode > 0, high, jnp.where(mode < 0, low, 0.0))
@@ -178,7 +178,7 @@ def _in_mode(plant: Plant, minv, x, v, z, mode, load: Load, start, share):
     """State after `share` of the step from `start` (both shares of the whole step), in a frozen mode."""
     first, last = load.time + start * load.step, load.time + (start + share) * load.step
     middle = load.time + (start + share / 2) * load.step
-    # The base's inertia is part of the force; what hidden masses feel of it is taken at the three nodes.
+    # The base's inertia is part of the force; its effect on hidden masses is taken at the three nodes.
     nodes = (
         (load.at(start), load.base[0], first),
         (load.at(start + share / 2), load.base[1], middle),
@@ -235,7 +235,7 @@ def through_events(plant: Plant, minv, motion: Motion, end: Motion, load: Load) 
         switched, kept = (at, now, then), carry
         return jax.tree.map(lambda new, old: jnp.where(jnp.any(ended), new, old), switched, kept), None
 
-    # The last mode goes to the end whatever happens; a step is short beside the time between reversals.
+    # The last mode continues to the end of the step, which is short compared to the time between reversals.
     (_, _, end), _ = jax.lax.scan(switch, (motion, jnp.zeros(()), end), length=_SEGMENTS - 1)
     return end
 

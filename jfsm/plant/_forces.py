@@ -1,7 +1,7 @@
-"""Forces of a plant in a state, and what becomes of its hidden states.
+"""Forces of a plant in a state, and the rates and bounds of its hidden states.
 
 x and v are displacement and velocity (dof,), z the hidden states (hidden,) of all memory slots in a row. The functions
-are jitted for their callers' sake: a step asks for the same forces many times over, and so traces them once.
+are jitted so that a step, which calls them many times, traces them once.
 """
 
 import equinox as eqx
@@ -17,7 +17,7 @@ Hidden = Float[Array, " hidden"]
 
 @eqx.filter_jit
 def smooth_force(plant: Plant, x: State, v: State, z: Hidden, t: Float[Array, ""]) -> State:
-    """Everything on the left-hand side but inertia, friction, and what answers the past."""
+    """Restoring force of the linear part, smooth laws, maps and memory laws: no inertia, friction or delayed force."""
     total = jnp.sum(plant.stiffness * x[None, :], 1) + jnp.sum(plant.damping * v[None, :], 1)
     slots = plant.smooth
     for i in range(len(slots)):
@@ -46,7 +46,7 @@ def hidden_rate(plant: Plant, x: State, v: State, z: Hidden, t: Float[Array, ""]
 
 
 def carried(plant: Plant) -> Float[Array, "hidden dof"]:
-    """Change of the hidden states with that of the velocities where masses are struck: what hangs on one goes along, as
+    """Change of the hidden states per jump of the velocities: an attached mass jumps with the mass that carries it, as
     it does with the base."""
     slots, known = plant.memory, np.zeros((len(plant.memory.laws), hidden_width(plant.memory)))
     for row, law in zip(known, slots.laws, strict=True):
@@ -56,14 +56,14 @@ def carried(plant: Plant) -> Float[Array, "hidden dof"]:
 
 @eqx.filter_jit
 def hidden_start(plant: Plant, x: State, v: State) -> Hidden:
-    """Hidden states that are relaxed in a state."""
+    """Relaxed hidden states in a state."""
     z = jnp.zeros(plant.hidden)
     return _each(plant, x, v, z, lambda law, d, w, mine: _padded(law.initial_state(d, w), mine))
 
 
 @eqx.filter_jit
 def settle(plant: Plant, x: State, z: Hidden) -> Hidden:
-    """Hidden states within their bounds."""
+    """Hidden states, projected to their bounds."""
     return _each(plant, x, x, z, lambda law, d, w, mine: _padded(law.settle(d, mine[: law.states]), mine))
 
 

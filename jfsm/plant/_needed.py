@@ -15,15 +15,15 @@ from jaxtyping import Array, Float
 from ._forces import friction_limits, hidden_rate, hidden_start, settle, smooth_force
 from ._grid import delayed_along, shifted
 from ._imposed import Imposed
-from ._plant import Plant, Readout
+from ._plant import Observation, Plant
 from ._stepper import runge_kutta
 
 _NOTHING = 1e-300
-"""Added under a root: hidden states that a law lacks are nothing, and have no slope."""
+"""Added under a root: unused hidden states are zero, and have no slope."""
 
 
 class Needed(NamedTuple):
-    """Force (n, dof) of a motion as its sensors read it, without their noise, and what it is not certain of.
+    """Force (n, dof) of a motion as its sensors read it, without their noise, and its uncertainty.
 
     `slopes` (n, force's dof, motion's dof, 3) are its derivatives by x, v and a, `besides` (n, dof) is the variance
     that the side to which friction acts and hidden states at the start leave.
@@ -35,16 +35,18 @@ class Needed(NamedTuple):
 
 
 @eqx.filter_jit
-def force_needed(plant: Plant, show: Readout, imposed: Imposed) -> Float[Array, "n dof"]:
+def force_needed(plant: Plant, observation: Observation, imposed: Imposed) -> Float[Array, "n dof"]:
     """Force (n, dof) of an imposed motion, hidden states relaxed at the start."""
-    return needed(plant, show, imposed, jnp.zeros(())).force
+    return needed(plant, observation, imposed, jnp.zeros(())).force
 
 
-def needed(plant: Plant, show: Readout, imposed: Imposed, doubt: Float[Array, ""]) -> Needed:
-    """As `force_needed`, to be traced, with its error; `doubt` is that of what laws remember at the start, as a
-    share of its rms along the motion: hidden states, and the motion before it began.
+def needed(plant: Plant, observation: Observation, imposed: Imposed, doubt: Float[Array, ""]) -> Needed:
+    """As `force_needed`, to be traced, with its error.
+
+    `doubt` is the standard deviation of hidden states and of delayed forces at the start, as a share of their rms along
+    the motion.
     """
-    moved = _recentred(plant, show, imposed)
+    moved = _recentred(plant, observation, imposed)
     x, v, time = moved.x[:, 0], moved.v[:, 0], moved.time
     z0 = hidden_start(plant, x[0], v[0])
     push = jax.vmap(lambda e: jax.jvp(lambda z: _hidden_along(plant, moved, z), (z0,), (e,)), out_axes=(None, -1))
@@ -79,10 +81,10 @@ def needed(plant: Plant, show: Readout, imposed: Imposed, doubt: Float[Array, ""
     )
 
 
-def _recentred(plant: Plant, show: Readout, imposed: Imposed) -> Imposed:
+def _recentred(plant: Plant, observation: Observation, imposed: Imposed) -> Imposed:
     """The motion without the offsets of its displacement channels."""
-    rows = [i for i, kind in enumerate(show.kinds) if kind == "displacement"]
-    shift = sum((plant.channel_offset[i] * show.select[i] for i in rows), jnp.zeros(plant.dof))
+    rows = [i for i, kind in enumerate(observation.kinds) if kind == "displacement"]
+    shift = sum((plant.channel_offset[i] * observation.select[i] for i in rows), jnp.zeros(plant.dof))
     return eqx.tree_at(lambda m: m.x, imposed, imposed.x - shift[None, None, :])
 
 
@@ -109,7 +111,7 @@ def _hidden_along(plant: Plant, imposed: Imposed, z0: Float[Array, " hidden"]) -
 
 
 def _with_slopes(plant: Plant, x, v, z, t):
-    """Force of all but inertia, friction and what answers the past, and its slopes by x, v and z."""
+    """Smooth force, without inertia, friction and delayed forces, and its slopes by x, v and z."""
 
     def force(x, v, z):
         total = smooth_force(plant, x, v, z, t)
@@ -134,14 +136,14 @@ def _friction(plant: Plant, x, v, speed_std, t):
 
 
 def _before_the_start(plant: Plant, time):
-    """1 (n,) while a delayed force answers what was before the record, 0 afterwards, with a sample in between."""
+    """1 (n,) while a delayed force depends on the motion before the record, 0 afterwards, over one sample."""
     slots = plant.delayed
     longest = jnp.max(jnp.stack([slots.choose(i, lambda law: law.delay) for i in range(len(slots))]))
     return jnp.clip((longest - (time - time[0])) / (time[1] - time[0]), 0.0, 1.0)
 
 
 def _delayed(plant: Plant, x, v, time):
-    """Force (n, dof) of what answers the past, and its slope (n, dof, dof) by a shift of each degree of freedom."""
+    """Delayed force (n, dof), and its slope (n, dof, dof) by a shift of each degree of freedom."""
     along = jax.vmap(
         lambda e: jax.jvp(lambda s: delayed_along(plant, x + s[None, :], v, time), (jnp.zeros_like(e),), (e,)),
         out_axes=(None, -1),

@@ -1,7 +1,7 @@
-"""A structure lowered to arrays: what a compiled program sees of it.
+"""A structure lowered to arrays, the input of compiled programs.
 
-A program is keyed by the number of degrees of freedom, of slots and of channels, and by the table of laws, never by
-which law of the table stands in a slot, by its place, sign or values: those are data.
+A program is keyed by the number of degrees of freedom, of slots and of channels, and by the table of laws, not by
+the law in a slot, nor by its place, sign or values: those are data.
 """
 
 import math
@@ -43,7 +43,7 @@ HIDDEN_STATES = 2
 
 
 _REACH = 64
-"""Samples that a delay may reach back, at least."""
+"""Least length of a delay buffer, in samples."""
 
 
 class Grid(NamedTuple):
@@ -58,15 +58,15 @@ class Grid(NamedTuple):
         return 2 * self.dt / self.substeps
 
     def reach(self, delayed: Sequence[Any]) -> int:
-        """Samples that the past must reach back for these terms, a power of two."""
+        """Length of the delay buffer for these terms in samples, a power of two."""
         longest = max((float(known(term.delay, "Delays")) for term in delayed), default=0.0)
         return max(_REACH, 2 ** math.ceil(math.log2(longest / self.dt + 3)))
 
 
 class Slots(eqx.Module):
-    """Places for laws of one class, in one compiled program whatever stands in them.
+    """Slots for laws of one class: one compiled program serves all laws of the class.
 
-    An empty slot has direction zero and acts on nothing.
+    An empty slot has direction zero and exerts no force.
     """
 
     kind: Int[Array, " slots"]
@@ -78,19 +78,19 @@ class Slots(eqx.Module):
         return self.kind.shape[0]
 
     def term(self, law: type, parameters: Float[Array, " width"]) -> Any:
-        """The term of this class that a row of numbers means."""
+        """Term of a law of this class with a row of parameters."""
         count = len(law.parameters) + (law is StiffnessDrop)
         return law(*(parameters[i] for i in range(count)), at=(0, 1))
 
     def choose(self, slot: int, ask: Callable[[Any], Any]) -> Any:
-        """What `ask` makes of the term that stands in a slot."""
+        """Value of `ask` at the term in a slot."""
         branches = [lambda p, law=law: ask(self.term(law, p)) for law in self.laws]
         if len(branches) == 1:
             return branches[0](self.parameters[slot])
         return jax.lax.switch(self.kind[slot], branches, self.parameters[slot])
 
     def alone(self) -> "Slots":
-        """The same slots with the laws that stand in them for a table: a program of its own, and many times faster."""
+        """The same slots, with their own laws as the table: a program of its own, and many times faster."""
         kinds = self.kind.tolist()
         present = list(dict.fromkeys(kinds))
         if not present:
@@ -113,8 +113,8 @@ class MapSlot(eqx.Module):
 class Plant(eqx.Module):
     """Arrays of a structure and of its sensors, for one list of response channels.
 
-    `force_delay` and `channel_delay` are empty where nothing is late: being late has programs of its own. Each channel
-    delay belongs to the channel that `late_channel` counts. Delayed forces reach back at most `reach` samples. With
+    `force_delay` and `channel_delay` are empty without delayed sensors: delays have programs of their own.
+    `late_channel` holds the channel of each channel delay. Delayed forces reach back at most `reach` samples. With
     `rolled` stages of a step the program is a third smaller, as fast for one motion and its derivatives, and half as
     fast for many motions.
     """
@@ -143,14 +143,14 @@ class Plant(eqx.Module):
 
     @property
     def elementary(self) -> bool:
-        """Whether sums, products and functions are all it asks for: no look at the past, no maps, no users' laws."""
+        """Whether it needs sums, products and functions alone: no delayed forces, maps or users' laws."""
         tables = (SMOOTH_TERMS, FRICTION_TERMS, MEMORY_TERMS)
         known = all(s.laws == table for s, table in zip((self.smooth, self.friction, self.memory), tables, strict=True))
         return known and not self.maps and not len(self.delayed)
 
     @property
     def laws(self) -> int:
-        """Number of terms beside the linear springs and dashpots."""
+        """Number of terms, without linear springs and dashpots."""
         return sum(map(len, (self.smooth, self.friction, self.memory, self.delayed, self.maps)))
 
     @property
@@ -159,19 +159,19 @@ class Plant(eqx.Module):
         return len(self.memory) * hidden_width(self.memory)
 
 
-class Readout(eqx.Module):
-    """Which response each channel shows: its kind, and a row that selects the degree of freedom."""
+class Observation(eqx.Module):
+    """Observation of the state by response channels: the kind of each, and a row that selects its degree of freedom."""
 
     select: Float[Array, "channels dof"]
     kinds: tuple[str, ...] = eqx.field(static=True)
 
 
-def readout(channels: Sequence[Channel], dof: int) -> Readout:
-    """Selectors of the response channels (kind, degree of freedom)."""
+def observation_of(channels: Sequence[Channel], dof: int) -> Observation:
+    """Observation by response channels (kind, degree of freedom)."""
     rows = np.zeros((len(channels), dof))
     for i, (_, j) in enumerate(channels):
         rows[i, j - 1] = 1.0
-    return Readout(jnp.asarray(rows), tuple(kind for kind, _ in channels))
+    return Observation(jnp.asarray(rows), tuple(kind for kind, _ in channels))
 
 
 def direction(at: tuple[int, int], dof: int) -> np.ndarray:
@@ -183,13 +183,19 @@ def direction(at: tuple[int, int], dof: int) -> np.ndarray:
     return row
 
 
+def state_matrix(stiffness: np.ndarray, damping: np.ndarray) -> np.ndarray:
+    """Matrix of y' = matrix y, y = (x, v), from stiffness and damping (..., dof, dof) over the mass."""
+    one = np.broadcast_to(np.eye(stiffness.shape[-1]), stiffness.shape)
+    return np.block([[np.zeros_like(stiffness), one], [-stiffness, -damping]])
+
+
 def hidden_width(memory: Slots) -> int:
     """Hidden states per slot."""
     return max(HIDDEN_STATES, *(law.states for law in memory.laws))
 
 
 def alone(plant: Plant) -> Plant:
-    """The plant with tables of the laws that it has, and no others."""
+    """The plant with tables of its own laws, and no others."""
     classes = ("smooth", "friction", "memory", "delayed")
     return replace(plant, **{name: getattr(plant, name).alone() for name in classes})
 
@@ -208,7 +214,7 @@ def numbers_of(
     grid: Grid | None = None,
     rolled: bool = False,
 ) -> Plant:
-    """Plant of a structure, its arrays those of NumPy; numbers that are traced make theirs traced.
+    """Plant of a structure, as NumPy arrays; traced numbers make their arrays traced.
 
     Parameters
     ----------
@@ -241,7 +247,7 @@ def numbers_of(
     channel_delay = {}
     for sensor in structure.sensors:
         if isinstance(sensor, Clipping):
-            continue  # concerns readings, not what is behind them
+            continue  # acts on readings, not on the motion
         whose, place = "force", sensor.at[1] - 1
         if sensor.at[0] != "force":
             if sensor.at not in channels:

@@ -1,4 +1,4 @@
-"""What drives a run, taken from a record."""
+"""Excitation of a run, from a record, and the steps per sample that a structure needs."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -13,7 +13,7 @@ from ..records import Record, declipped, silent_forces
 from ..structures import Clipping, LinearDamping, LinearStiffness, Structure
 from ._drive import Reconstruction, reconstruct
 from ._forces import hidden_start
-from ._grid import Fine
+from ._grid import InterpolatedInput
 from ._plant import Plant, numbers_of
 from ._stepper import inverse_mass, linearised
 
@@ -26,7 +26,7 @@ _FINER = 4
 
 
 class Probe(NamedTuple):
-    """A state, in usual sizes, at which to ask what is faster than the linear part; its largest angle per step."""
+    """A state, in typical sizes, at which the fastest rate is computed; the largest angle per step there."""
 
     displacement: float
     velocity: float
@@ -34,8 +34,8 @@ class Probe(NamedTuple):
 
 
 _PROBES = (
-    # What is fast at some speed follows something slow, and need not be followed closely; at the largest speeds it is
-    # over so soon that it need only stay stable.
+    # A rate that is fast at some speed follows a slow motion, and needs less accuracy; at the largest speeds it is over
+    # so soon that stability is enough.
     Probe(0.0, 0.0, 1.0),
     *(Probe(0.0, share, 1.0) for share in (1.0, -1.0)),
     *(Probe(0.0, share, 2.0) for share in (3.0, -3.0)),
@@ -54,7 +54,7 @@ class Size(NamedTuple):
 _KINKED_SUBSTEPS = 2
 """Steps per sample at least for hidden states, which yield and slide at instants of their own."""
 _CREST = 4.0
-"""Peak of what goes on all the time, in root mean squares, at most."""
+"""Largest peak of a persistent motion, in root mean squares."""
 _STABLE_ANGLE = 2.6
 """Largest angle per step at which Runge-Kutta of order four does not blow up by itself."""
 
@@ -74,7 +74,7 @@ def fastest_mode(plant: Plant) -> float:
 
 
 def probes(dof: int, size: Size) -> Iterator[tuple[np.ndarray, np.ndarray, float]]:
-    """Displacements and velocities (dof,) at which to ask what is fast, and the largest angle per step there.
+    """Displacements and velocities (dof,) at which fast rates are sought, and the largest angle per step there.
 
     Masses move together, and neighbours against each other.
     """
@@ -86,13 +86,13 @@ def probes(dof: int, size: Size) -> Iterator[tuple[np.ndarray, np.ndarray, float
 def substeps_for(structure: Structure, dt: float, size: Size | None = None) -> int:
     """Steps per sample, a power of two, that keep the angle per step of the fastest mode or decay small.
 
-    Laws beside the linear ones may be faster, at rest or in motions of about this `size`: bristles, a friction that
-    turns over steeply, a spring that hardens. For these the steps may be longer.
+    Nonlinear laws may be faster, at rest or in motions of about this `size`: bristles, steep regularised friction, a
+    hardening spring. For these the steps may be longer.
 
     Raises
     ------
     ValueError
-        If the largest number of steps would still be unstable, which would pass for a motion that runs away.
+        If the largest number of steps would still be unstable: the result would look like a motion that diverges.
     """
     plant, zero = numbers_of(structure), np.zeros(structure.dof)
     linear = [term for term in structure.terms if isinstance(term, LinearStiffness | LinearDamping)]
@@ -128,9 +128,9 @@ def relaxed_jacobian(plant: Plant, x, v):
 
 
 def typical_size(record: Record) -> Size:
-    """Size of the motion, from whatever response there is; 0 where there is none.
+    """Size of the motion, from the measured response; 0 without one.
 
-    Of a decay it is that of its beginning.
+    A decay has the size of its beginning.
     """
     found = [Size(0.0, 0.0)]
     for (kind, _), y in record.responses.items():
@@ -151,7 +151,7 @@ def _size(y: np.ndarray) -> float:
 
 
 def measured_force(record: Record, dof: int, clipped_at: Mapping[tuple[str, int], float] | None = None) -> np.ndarray:
-    """Force samples (n, dof), zero where no force is applied; a channel that is noise only counts as zero.
+    """Force samples (n, dof), zero where no force is applied; a channel of noise alone counts as zero.
 
     Arcs beyond the limits `clipped_at`, by channel, are reconstructed.
     """
@@ -169,7 +169,7 @@ def measured_force(record: Record, dof: int, clipped_at: Mapping[tuple[str, int]
 
 
 def force_limits(structure: Structure) -> dict[tuple[str, int], float]:
-    """Limits beyond which the structure says that a force channel shows nothing."""
+    """Clipping limits of the force channels, as the structure states them."""
     return {s.at: s.value for s in structure.sensors if isinstance(s, Clipping) and s.at[0] == "force"}
 
 
@@ -182,8 +182,8 @@ def excitation(
     length: int | None = None,
     force: Any = None,
     base: np.ndarray | None = None,
-) -> Fine:
-    """Drive of a record on half steps, padded to `length` samples with its last value, which a late sensor asks for.
+) -> InterpolatedInput:
+    """Input of a record on half steps, padded to `length` samples with its last value, which a delayed sensor reads.
 
     `force` (n, dof) and `base` (n,) replace the record's own samples where they were smoothed or restored beforehand;
     the force may be traced.
@@ -204,4 +204,4 @@ def excitation(
     intervals: Any = xp.concatenate([known, ahead])
     step: Any = np.asarray(record.dt)
     time = record.time[0] + record.dt * np.arange(padded)
-    return Fine(intervals[..., :dof], intervals[..., dof], time, step)
+    return InterpolatedInput(intervals[..., :dof], intervals[..., dof], time, step)

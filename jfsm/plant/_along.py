@@ -10,7 +10,7 @@ from ._grid import delayed_along
 from ._plant import Plant
 from ._stepper import runge_kutta
 
-SUBSTEPS = 4
+HIDDEN_SUBSTEPS = 4
 """Steps of a hidden state per sample; the motion is straight in between."""
 
 
@@ -21,7 +21,7 @@ def force_along(
     v: Float[Array, "n dof"],
     time: Float[Array, " n"],
     *,
-    substeps: int = SUBSTEPS,
+    substeps: int = HIDDEN_SUBSTEPS,
 ) -> Float[Array, "n dof"]:
     """Force [N] of everything but the linear springs and dashpots along a motion; friction slides."""
     step = time[1] - time[0]

@@ -1,11 +1,11 @@
-r"""The motion that a rig imposes: between its samples, and with the error that its measurement leaves.
+r"""The motion that a rig imposes, between its samples, with its measurement error.
 
 All channels of a degree of freedom are readings of one quintic spline and its derivatives,
 
     x(t) = Σ c_i B_i(t),     c = argmin Σ_channels Σ_samples (y - x^(order))² / σ²,
 
-with uniform knots. Their spacing is that of the smallest generalised cross-validation score. Where a single channel
-fills its band, the spline goes through its samples.
+with uniform knots. Their spacing minimises the generalised cross-validation score. If a single channel fills
+its band, the spline interpolates its samples.
 
 The coefficients' error is Gaussian, its covariance the inverse of the normal matrix A. That is banded: with A = U Uᵀ, U
 an upper triangle, Uᵀ δc = w is a recursion forward in time, by which a filter can follow the error.
@@ -40,7 +40,7 @@ _LEAST_NOISE, _BAND_LIMITED = 1e-6, 1e-3
 _SHIFTED = 0.01
 """Constant of a velocity or an acceleration, as a share of its size, from which it is mentioned."""
 _HEAVY = 1e30
-"""Mass that no force of a structure moves: what is left are the rates of its hidden states."""
+"""Mass that no force of a structure moves, so that only the rates of its hidden states remain."""
 _ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
 
 
@@ -104,7 +104,7 @@ class _Trace(NamedTuple):
 class Path:
     """The motion of a record as splines, one of the displacement of each degree of freedom.
 
-    `notes` say what was assumed.
+    `notes` name the assumptions.
     """
 
     record: Record
@@ -118,7 +118,7 @@ class Path:
         return x, v, a
 
     def imposed(self, substeps: int, length: int | None = None) -> Imposed:
-        """The motion on half steps, padded to `length` samples with nothing."""
+        """The motion on half steps, padded to `length` samples with zeros."""
         record, n = self.record, len(self.record)
         padded = n if length is None else length
         ahead = np.arange(2 * substeps + 1) / (2 * substeps)
@@ -144,9 +144,9 @@ class Path:
 def imposed_motion(record: Record, structure: Structure) -> Path:
     """The motion of a record whose motion drives.
 
-    Gains, offsets and delays that the structure states of the channels are undone, but for offsets of displacements,
-    which stand in the plant. A velocity or an acceleration beside a displacement loses its constant: that of the
-    displacement's derivative counts. Without a displacement the velocity is integrated, to a mean of nothing.
+    The channels are corrected for the gains, offsets and delays of the structure, except for offsets of displacements,
+    which belong to the plant. If the displacement is measured, the mean of its derivative replaces that of the velocity
+    or acceleration. Without a displacement the velocity is integrated, with zero mean.
 
     Raises
     ------
@@ -182,7 +182,7 @@ def imposed_substeps(structure: Structure, dt: float, size: Size) -> int:
 
 
 def noise_of(floor: NoiseFloor, size: float) -> float:
-    """Noise of a channel; where the signal fills its band, what is surely none of it."""
+    """Noise of a channel; if its signal fills the band, the part of the floor that is surely noise."""
     if not floor.fills_band:
         return floor.std
     return max(min(floor.std, _BAND_LIMITED * size), floor.std - 2 * floor.std_error)

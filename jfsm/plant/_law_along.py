@@ -1,8 +1,8 @@
 """The forces of one law along a given motion of its link, for many sets of its numbers.
 
-A law that has no hidden states answers every instant by itself: one program of one size serves all of a table and every
-record, and a number chooses among them. So it does for laws with hidden states, which are a loop over samples, whatever
-steps they need.
+A law without hidden states is evaluated at each instant independently: one program of one size serves all laws of a
+table and every record, and a number chooses the law. Laws with hidden states have one program too, a loop over samples
+with any number of steps.
 """
 
 from collections.abc import Callable
@@ -24,7 +24,7 @@ from ..structures import (
     MapTerm,
     Structure,
 )
-from ._along import SUBSTEPS
+from ._along import HIDDEN_SUBSTEPS
 from ._grid import delayed_along
 from ._plant import LAW_PARAMETERS, Plant, Slots, hidden_width, numbers_of
 from ._stepper import runge_kutta
@@ -41,7 +41,7 @@ def forces_of_law(
     w: Float[np.ndarray, " n"],
     time: Float[np.ndarray, " n"],
     *,
-    substeps: int = SUBSTEPS,
+    substeps: int = HIDDEN_SUBSTEPS,
 ) -> Float[np.ndarray, "rows n"]:
     """Force [N] of a law on a link of displacement `d` and velocity `w`, for rows of its numbers; friction slides.
 
