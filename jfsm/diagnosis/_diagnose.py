@@ -24,7 +24,7 @@ from .evidence.missing_force import residual
 from .evidence.setup import Problem
 from .evidence.split import HeldOut, split
 from .hypotheses.candidates import Candidate, chosen_causes
-from .report.findings import Reached, Tested, assemble
+from .report.assemble import Reached, Tested, assemble
 from .report.unfinished import Unfinished
 from .search.steps import Progress, Steps
 from .search.study import Searched, Study
