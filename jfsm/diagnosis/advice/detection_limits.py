@@ -28,8 +28,10 @@ from ...identification import Posterior, prior
 from ...structures import Preload, Structure, is_offset
 from ..evidence.fitted import SLACKS, Trial, ended, extent, sets, windows
 from ..evidence.setup import Problem
-from ..hypotheses.candidates import Candidate, modest, own_paths
+from ..hypotheses.candidate import Candidate
 from ..hypotheses.effect import Effect
+from ..hypotheses.natural_starts import modest
+from ..hypotheses.parametrisation import own_paths
 from ..thresholds import THRESHOLDS
 
 _SPARED = 1.28

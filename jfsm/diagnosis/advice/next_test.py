@@ -27,8 +27,8 @@ from ..evidence.fitted import Trial
 from ..evidence.free_runs import remeasured
 from ..evidence.noise_draws import noise_levels
 from ..evidence.setup import Problem
-from ..hypotheses.candidates import at_rest
 from ..hypotheses.initial_values import found_in, own_part
+from ..hypotheses.placement import at_rest
 from ..thresholds import THRESHOLDS
 
 RIVAL = 0.02

@@ -18,7 +18,7 @@ from ..evidence.missing_force import Residual
 from ..evidence.plain import as_plain
 from ..evidence.scorecard import GIVEN
 from ..evidence.setup import Problem
-from ..hypotheses.candidates import Candidate
+from ..hypotheses.candidate import Candidate
 from ..search.searches import LeftBehind
 from ..verdict.decision import Decision
 from .estimates import Units, noise_by_channel, refitted_values, smallest_effects, unit_of

@@ -21,8 +21,10 @@ from ..evidence.identifiable import in_step
 from ..evidence.lack_of_fit import LackOfFit
 from ..evidence.noise_draws import beside_chance, noise_beyond
 from ..evidence.setup import Problem
-from ..hypotheses.candidates import Apart, Candidate, as_promising, candidates, contained, elsewhere, promising
+from ..hypotheses.candidate import Candidate, as_promising, contained, elsewhere, promising
+from ..hypotheses.candidates import candidates
 from ..hypotheses.effect import Effect
+from ..hypotheses.parametrisation import Apart
 from ..thresholds import THRESHOLDS
 from .searches import (
     FAR_BEHIND,
