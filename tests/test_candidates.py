@@ -8,19 +8,12 @@ import pytest
 from references import between_wells
 
 import jfsm
-from jfsm.diagnosis.hypotheses.candidates import (
-    Candidate,
-    Laws,
-    candidates,
-    chosen_causes,
-    contained,
-    elsewhere,
-    hypothesis,
-    own_paths,
-    promising,
-)
+from jfsm.diagnosis.hypotheses.candidate import Candidate, contained, elsewhere, promising
+from jfsm.diagnosis.hypotheses.candidates import candidates, chosen_causes
 from jfsm.diagnosis.hypotheses.effect import Effect
 from jfsm.diagnosis.hypotheses.initial_values import Begin, Start
+from jfsm.diagnosis.hypotheses.parametrisation import hypothesis, own_paths
+from jfsm.diagnosis.hypotheses.placement import Laws
 from jfsm.diagnosis.search.related_laws import resting
 from jfsm.identification import LANES, Nuisances, Posterior, prepare
 

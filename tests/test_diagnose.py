@@ -11,7 +11,7 @@ import jfsm
 from jfsm.diagnosis import _diagnose
 from jfsm.diagnosis.evidence import measured
 from jfsm.diagnosis.evidence.free_runs import Gain
-from jfsm.diagnosis.hypotheses.candidates import Candidate, as_promising, promising
+from jfsm.diagnosis.hypotheses.candidate import Candidate, as_promising, promising
 from jfsm.diagnosis.hypotheses.effect import Effect
 from jfsm.identification import _likelihood
 

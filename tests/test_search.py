@@ -12,15 +12,12 @@ import jfsm
 from jfsm._limit import UNLIMITED
 from jfsm.diagnosis.evidence.score_test import Replaced, gains
 from jfsm.diagnosis.evidence.setup import Problem
-from jfsm.diagnosis.hypotheses.candidates import (
-    Candidate,
-    Laws,
-    candidates,
-    chosen_causes,
-    hypothesis,
-)
+from jfsm.diagnosis.hypotheses.candidate import Candidate
+from jfsm.diagnosis.hypotheses.candidates import candidates, chosen_causes
 from jfsm.diagnosis.hypotheses.effect import Effect
 from jfsm.diagnosis.hypotheses.initial_values import Begin, Start, begun
+from jfsm.diagnosis.hypotheses.parametrisation import hypothesis
+from jfsm.diagnosis.hypotheses.placement import Laws
 from jfsm.diagnosis.search import batches
 from jfsm.diagnosis.search.baseline import fit_model, refit_from
 from jfsm.diagnosis.search.batches import Found, LeftBehind, groups

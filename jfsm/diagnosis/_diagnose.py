@@ -23,8 +23,9 @@ from .evidence.measured import HeldOutRuns, Weighed
 from .evidence.missing_force import residual
 from .evidence.setup import Problem
 from .evidence.split import HeldOut, split
-from .hypotheses.candidates import Candidate, chosen_causes
-from .report.findings import Reached, Tested, assemble
+from .hypotheses.candidate import Candidate
+from .hypotheses.candidates import chosen_causes
+from .report.assemble import Reached, Tested, assemble
 from .report.unfinished import Unfinished
 from .search.rounds import Searched
 from .search.steps import Progress, Steps

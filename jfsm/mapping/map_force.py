@@ -6,16 +6,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jax
 import numpy as np
 
 from .._programs import programs_kept
 from .._result import Estimate
 from .._types import evenly_taken
-from ..estimation import RestoringForce, estimate_force_map, restoring_force
+from ..estimation import RestoringForce, restoring_force
 from ..records import Record
 from ..structures import Parameter, Structure
-from ..surrogates import RKPM, Discontinuity, Kriging, PolynomialTrend, find_discontinuities
+from ..surrogates import RKPM, Discontinuity, Kriging, find_discontinuities
+from .learned_map import LearnedMap, check_method, learn
 from .plot_data import GRID, shown_map, shown_points
 
 _READINGS = 5000
@@ -24,15 +24,10 @@ _UNSURE = 2.0
 """Medians of the force's standard error beyond which a reading is left out: a smoother knows the ends less well."""
 _BLURRED = 0.02
 """Standard error of a state, as a share of its standard deviation, from which the map is noticeably flattened."""
-_ORDERS, _SUPPORTS = (2, 3), (160, 320, 640)
-"""What is tried: sixteen readings per monomial of a cubic at least. Leave-one-out errors would prefer fewer, for
-readings in a row share their errors; more than these make a map slow."""
 _SIDES = 3.0
 """Standard errors of a state within which a reading may be on either side of a jump."""
 _LITTLE = 0.25
 """Share of the box below which a record says little of the force in it."""
-_UNCORRELATED = 0.05
-"""Correlation of what the map leaves from which readings count as independent."""
 _QUANTILE_95 = 1.959964
 _COEFFICIENTS = {
     (1, 0): Parameter("stiffness", force=1, length=-1),
@@ -44,7 +39,7 @@ _DERIVATIVES = ("dF/dx", "dF/dv", "d³F/dx³ / 6")
 
 @dataclass(frozen=True, repr=False)
 class MappedForce:
-    """A force state map, and how much is to be made of it.
+    """A force state map with its errors and its limits.
 
     Attributes
     ----------
@@ -65,7 +60,7 @@ class MappedForce:
     visited : float
         Share of the box between the lowest and the highest displacement and velocity where readings were taken.
     notes : tuple of str
-        What is to be known beside.
+        What a reader has to know about the map.
     data : dict
         Everything that the page shows, as plain types.
     """
@@ -137,12 +132,7 @@ def map_force(
     of a jump that was not found, as that of dry friction from displacement alone: intervals near it are too narrow.
     All this is of maps that are learned after the motion, not together with it.
     """
-    if method not in ("rkpm", "kriging", "joint"):
-        raise ValueError(f'`method` must be "rkpm", "kriging" or "joint"; got {method!r}.')
-    if method == "joint" and mass is None:
-        raise ValueError('`method="joint"` maps all of the force on a single mass: give `mass`, and no model.')
-    if order is not None and order < (1 if method == "rkpm" else 0):
-        raise ValueError(f"`order` must be an integer of {1 if method == 'rkpm' else 0} or more; got {order!r}.")
+    check_method(method, mass, order)
     readings = restoring_force(record, model, mass, at)
     known = np.flatnonzero(readings.std <= _UNSURE * np.median(readings.std))
     taken = known[evenly_taken(known.size, _READINGS)]
@@ -151,22 +141,13 @@ def map_force(
         edges = find_discontinuities(states, force)
         sided = ~_torn(states, readings.states_std[taken], edges)
         states, force = states[sided], force[sided]
-        if method == "joint":
-            learned = _by_joint(record, mass, states, force, order)
-        else:
-            learned = _by_rkpm(states, force, edges, order) if method == "rkpm" else _by_kriging(states, force, order)
+        learned = learn(method, record, mass, states, force, edges, order)
         centre, coefficients = _at_centre(learned, states, force, record.units)
         curves = _curves(learned, readings.at, states, force, centre, record.units)
     except RuntimeError as error:  # the map has no value somewhere in the box
         raise ValueError(f"`record` does not determine a map: {error}") from error
     visited = float(np.mean(curves["map"]["visited"]))
-    notes = tuple(_notes(learned, readings, states, edges, known.size, int(np.sum(~sided))))
-    if visited < _LITTLE:
-        notes = (
-            f"Only {visited:.0%} of the box was visited, as by a steady vibration: between its orbits the map does not "
-            "know the force. Record a motion whose amplitude changes.",
-            *notes,
-        )
+    notes = tuple(_notes(learned, readings, states, edges, visited, known.size, int(np.sum(~sided))))
     data = {
         "name": record.name,
         "samples": len(record),
@@ -194,26 +175,6 @@ def map_force(
     )
 
 
-@dataclass(frozen=True)
-class _Learned:
-    """A map, its error, how it came about, by how much its standard errors are to be multiplied, and whether noise in
-    the states flattens it."""
-
-    force_map: RKPM | Kriging
-    error: float
-    words: dict[str, str]
-    widening: float
-    remarks: tuple[str, ...] = ()
-    flattened: bool = True
-
-    def std(self, states: np.ndarray, orders: tuple[int, ...] = (0, 0)) -> np.ndarray:
-        """Standard errors of the map or of its derivative at many states."""
-        if isinstance(self.force_map, Kriging):
-            return self.widening * np.asarray(self.force_map.evaluate_std(states, orders))
-        rkpm = self.force_map
-        return self.widening * np.asarray(jax.vmap(lambda state: rkpm.std(state, orders))(states))
-
-
 def _torn(states: np.ndarray, std: np.ndarray, edges: tuple[Discontinuity, ...]) -> np.ndarray:
     """Readings so near to a jump that noise may have put them on its wrong side, where they would bend the map."""
     torn = np.zeros(len(states), dtype=bool)
@@ -225,66 +186,8 @@ def _torn(states: np.ndarray, std: np.ndarray, edges: tuple[Discontinuity, ...])
     return torn
 
 
-def _by_rkpm(states: np.ndarray, force: np.ndarray, edges: tuple[Discontinuity, ...], order: int | None) -> _Learned:
-    orders, remarks = _ORDERS if order is None else (order,), ()
-    supports = [count for count in _SUPPORTS if count <= len(states) // 2] or None
-    try:
-        force_map, scores = RKPM.select(states, force, orders, supports, across=edges)
-    except ValueError:
-        if not edges:
-            raise
-        remarks = ("The readings on one side of a discontinuity are too few for a map of their own: it is smoothed.",)
-        force_map, scores = RKPM.select(states, force, orders, supports)
-    best = next(score for score in scores if score.chosen)
-    words = {
-        "method": "RKPM",
-        "order": str(best.order),
-        "support": f"{best.neighbours} of {len(force_map.nodes)} readings around each state",
-    }
-    return _Learned(force_map, best.error, words, _widening(force_map, states, force), remarks)
-
-
-def _by_kriging(states: np.ndarray, force: np.ndarray, order: int | None) -> _Learned:
-    trend = PolynomialTrend(2 if order is None else order)
-    force_map = Kriging.fit(states, force, trend=trend)
-    error = float(force_map.leave_one_out().rms)
-    words = _kriging_words("Kriging", force_map, trend)
-    return _Learned(force_map, error, words, _widening(force_map, states, force), force_map.remarks)
-
-
-def _by_joint(record: Record, mass: float | None, states: np.ndarray, force: np.ndarray, order: int | None) -> _Learned:
-    trend = PolynomialTrend(2 if order is None else order)
-    force_map = estimate_force_map(record, mass, trend=trend)
-    error = float(np.sqrt(np.mean((force - np.asarray(force_map.evaluate(states))) ** 2)))
-    words = _kriging_words("Kriging together with the motion", force_map, trend)
-    return _Learned(force_map, error, words, 1.0, force_map.remarks, flattened=False)
-
-
-def _kriging_words(method: str, force_map: Kriging, trend: PolynomialTrend) -> dict[str, str]:
-    lengths = ", ".join(f"{length:.3g}" for length in np.asarray(force_map.length_scale))
-    return {
-        "method": method,
-        "order": f"{trend.order} (trend)",
-        "support": f"Gaussian correlation, length scales {lengths}",
-    }
-
-
-def _widening(force_map: RKPM | Kriging, states: np.ndarray, force: np.ndarray) -> float:
-    """Root of how many readings in a row count as one, by the correlation of what the map leaves."""
-    residual = force - np.asarray(force_map.evaluate(states))
-    residual = residual - residual.mean()
-    n = residual.size
-    power = np.abs(np.fft.rfft(residual, 2 * n)) ** 2
-    correlation = np.fft.irfft(power)[: n // 4]
-    if correlation[0] == 0.0:
-        return 1.0
-    correlation = correlation / correlation[0]
-    last = int(np.argmax(correlation < _UNCORRELATED)) or correlation.size
-    return math.sqrt(1.0 + 2.0 * float(np.sum(correlation[1:last])))
-
-
 def _at_centre(
-    learned: _Learned, states: np.ndarray, force: np.ndarray, units: Any
+    learned: LearnedMap, states: np.ndarray, force: np.ndarray, units: Any
 ) -> tuple[np.ndarray, dict[str, Estimate]]:
     """The state nearest to rest, and the derivatives there."""
     rest = np.zeros(2)
@@ -303,7 +206,7 @@ def _at_centre(
 
 
 def _curves(
-    learned: _Learned, at: tuple[int, int], states: np.ndarray, force: np.ndarray, centre: np.ndarray, units: Any
+    learned: LearnedMap, at: tuple[int, int], states: np.ndarray, force: np.ndarray, centre: np.ndarray, units: Any
 ) -> dict[str, Any]:
     """Readings, the map, and its cuts through the centre with their 95 % bands, where the record has been."""
     axes = np.linspace(states.min(axis=0), states.max(axis=0), GRID)
@@ -336,14 +239,20 @@ def _line(edge: Discontinuity) -> dict[str, Any]:
 
 
 def _notes(
-    learned: _Learned,
+    learned: LearnedMap,
     readings: RestoringForce,
     states: np.ndarray,
     edges: tuple[Discontinuity, ...],
+    visited: float,
     kept: int,
     torn: int,
 ) -> Iterator[str]:
-    """What is to be known beside the figures."""
+    """What a reader has to know about the map, apart from its figures."""
+    if visited < _LITTLE:
+        yield (
+            f"Only {visited:.0%} of the box was visited, as by a steady vibration: between its orbits the map does not "
+            "know the force. Record a motion whose amplitude changes."
+        )
     left_out = readings.force.size - kept
     if left_out:
         yield f"{left_out} of {readings.force.size} samples, where the force is known less well, are left out."

@@ -18,7 +18,7 @@ is linear in its size, and an estimate for friction and large effects.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -28,8 +28,10 @@ from ...identification import Posterior, prior
 from ...structures import Preload, Structure, is_offset
 from ..evidence.fitted import SLACKS, Trial, ended, extent, sets, windows
 from ..evidence.setup import Problem
-from ..hypotheses.candidates import Candidate, modest, own_paths
+from ..hypotheses.candidate import Candidate
 from ..hypotheses.effect import Effect
+from ..hypotheses.natural_starts import modest
+from ..hypotheses.parametrisation import own_paths
 from ..thresholds import THRESHOLDS
 
 _SPARED = 1.28
@@ -63,7 +65,7 @@ class Smallest(NamedTuple):
 
 
 class Silence(NamedTuple):
-    """What was believed, and is to be beaten."""
+    """The model as given and its refit, which an effect has to beat to be found."""
 
     given: Trial
     refitted: Trial
@@ -115,14 +117,17 @@ class _Seen:
         self.unknowns, self.program = posterior.hypothesis.unknowns[0], posterior.program
         own, entries = silence.problem.model.entries(), posterior.hypothesis.structures[0].entries()
         self.own = own_paths(silence.problem.model, silence.problem.records)
-        mine = {path for path in entries if path not in own and not is_offset(path)}
-        self.mine = [k for k, u in enumerate(self.unknowns) if u.path in mine]
+        added = [path for path in entries if path not in own]
+        self.mine = [k for k, u in enumerate(self.unknowns) if u.path in added and not is_offset(u.path)]
         self.path = self.unknowns[self.mine[0]].path
         part = self.path.split(".")[0] + "."
-        self.paths = [p for p in entries if p.startswith(part) and p not in own]
-        # Of a sensor's fault no number holds a force: the only one that it has is its size.
-        sizes = {p for p in self.paths if entries[p][0].force} or {self.path}
+        self.paths = [path for path in added if path.startswith(part)]
+        sizes = self._sizes(entries)
         self.grows = np.array([self.unknowns[k].path in sizes for k in self.mine])
+
+    def _sizes(self, entries: Mapping[str, tuple]) -> set[str]:
+        """Its numbers that hold a force; of a sensor's fault, which has none, the only one that it has."""
+        return {path for path in self.paths if entries[path][0].force} or {self.path}
 
     def natural(self) -> Smallest | None:
         """Its smallest size from a modest one; from that found, where it is far from modest.
@@ -174,17 +179,23 @@ class _Seen:
             far = (theta[mine] + grows * math.log(factor) - center) / width
             return 0.5 * float(np.sum(far**2) + np.sum(np.log1p(factor**2 * scaled)))
 
-        [effect] = self.effects
-        # Own values may make up for a sensor's fault: it has to be likelier than they are, by no margin. A law may have
-        # to beat a refit that leaves nothing.
-        least = (
-            THRESHOLDS.significant if effect.cause.is_sensor or effect.cause.effect is Preload else THRESHOLDS.searched
-        )
+        over_refit, over_given = self._needed()
         return max(
-            _NAMED * _significant(beside_refit[np.ix_(grows, grows)], 0.0 if effect.cause.is_sensor else least, cost),
-            _NAMED * _significant(beside_given[np.ix_(grows, grows)], least + self.silence.spared, cost),
+            _NAMED * _significant(beside_refit[np.ix_(grows, grows)], over_refit, cost),
+            _NAMED * _significant(beside_given[np.ix_(grows, grows)], over_given, cost),
             _noticeable(self.posterior, theta, self.grown(theta, -_GONE), self.silence.given),
         )
+
+    def _needed(self) -> tuple[float, float]:
+        """Nats that the effect has to gain over the refit, and over the model as given.
+
+        Own values may make up for a sensor's fault: it has to be likelier than they are, by no margin. A law may have
+        to beat a refit that leaves nothing.
+        """
+        [effect] = self.effects
+        sensor = effect.cause.is_sensor
+        least = THRESHOLDS.significant if sensor or effect.cause.effect is Preload else THRESHOLDS.searched
+        return 0.0 if sensor else least, least + self.silence.spared
 
 
 def _told(information: np.ndarray, believed: np.ndarray, mine: list[int], free: list[int]) -> np.ndarray:

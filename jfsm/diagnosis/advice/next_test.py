@@ -8,10 +8,9 @@ says for either counts.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import jax
 import numpy as np
@@ -27,14 +26,13 @@ from ..evidence.fitted import Trial
 from ..evidence.free_runs import remeasured
 from ..evidence.noise_draws import noise_levels
 from ..evidence.setup import Problem
-from ..hypotheses.candidates import at_rest
 from ..hypotheses.initial_values import found_in, own_part
+from ..hypotheses.placement import at_rest
 from ..thresholds import THRESHOLDS
+from .variation import LEVELS, Variation, planned_record, variations
 
 RIVAL = 0.02
 """Probability from which another explanation is a rival."""
-_LEVELS, _SPEEDS, _SHIFTS = (0.25, 0.5, 2.0, 4.0), (0.35, 0.7, 1.4), (0.5, -0.5)
-"""How much larger and faster the drive of a test may be, and a constant force beside it in its rms."""
 _LONGER, _PLENTY, _LONGEST = (4, 16), 20.0, 50_000
 """How much longer the best test is proposed as well, the nats, at least, from which it is long enough, and its samples
 at most."""
@@ -44,7 +42,6 @@ _SIDE = 21
 """States to a side on which forces are compared,"""
 _SAME = 0.02
 """and share of a law's force up to which two are the same."""
-_KINDS = ("displacement", "velocity", "acceleration")
 
 
 @dataclass(frozen=True)
@@ -81,39 +78,6 @@ class Proposal:
 
 
 @dataclass(frozen=True)
-class Variation:
-    """A record at hand, changed: drive times `level`, `speed` times as fast, constant forces of `shift` times its rms,
-    and channels of another kind; the drive there and back, until it is `length` times as long."""
-
-    level: float = 1.0
-    speed: float = 1.0
-    shift: float = 0.0
-    kind: str = ""
-    length: int = 1
-
-    def words(self, record: Record) -> str:
-        """What to do, as a sentence without a stop."""
-        longer = f", there and back until it is {self.length} times as long" if self.length > 1 else ""
-        return self._what(record) + longer
-
-    def _what(self, record: Record) -> str:
-        shaken = record.drive == "motion" or record.base_acceleration is not None
-        drive = "the same motion" if shaken else "the same force" if record.driven else "a release"
-        if self.kind:
-            return f"the same test with the {self.kind} measured as well"
-        if self.shift:
-            forces = [
-                f"{self.shift * _rms(y):+.3g} {record.units['force']}"
-                for (kind, _), y in record.channels.items()
-                if kind == "force"
-            ]
-            return f"{drive} with a constant force of {' and '.join(forces)} added"
-        if self.speed != 1.0:
-            return f"{drive} played {self.speed:g} times as fast"
-        return f"{drive} {'from' if drive == 'a release' else 'at'} {self.level:g} times the size"
-
-
-@dataclass(frozen=True)
 class Leading:
     """The two most probable explanations of a record, and the first `samples` of it, on which tests are modelled."""
 
@@ -136,41 +100,32 @@ class Leading:
         second = next((t for t in others if share(t) >= RIVAL and not same_force(first, t, nuisances)), None)
         return None if second is None else cls(model, (first, second), nuisances, until)
 
-    def tests(self) -> list[Variation]:
-        """Tests that could be made with this structure."""
-        record = self.nuisances.record
-        tests = [Variation(level=level) for level in _LEVELS]
-        if record.drive == "motion":
-            return tests
-        if record.driven:
-            tests += [Variation(speed=speed) for speed in _SPEEDS]
-        if any(kind == "force" and np.any(y) for (kind, _), y in record.channels.items()):
-            tests += [Variation(shift=shift) for shift in _SHIFTS]
-        measured = {kind for kind, _ in self.nuisances.channels}
-        return tests + [Variation(kind=kind) for kind in _KINDS if kind not in measured]
-
 
 def proposals(leading: Leading, key: jax.Array, tell: Callable[[str, int, int], None] | None = None) -> list[Proposal]:
     """Every test that could be simulated, the one that tells most first."""
-    tests, found = leading.tests(), list[tuple[Proposal, Variation]]()
-    record = leading.nuisances.record
+    tests = variations(leading.nuisances)
 
-    def tried(test: Variation, done: int) -> list[Proposal]:
-        words = test.words(record)
+    def tried(test: Variation, done: int) -> list[tuple[Proposal, Variation]]:
+        words = test.words(leading.nuisances.record)
         if tell is not None:
             tell(words, done, max(len(tests), done + 1))
-        return _tried(leading, test, words, jax.random.fold_in(key, done))
+        return [(proposal, test) for proposal in _tried(leading, test, words, jax.random.fold_in(key, done))]
 
-    for done, test in enumerate(tests):
-        found += [(proposal, test) for proposal in tried(test, done)]
-    if found and record.driven and record.drive == "force":
-        for length in _LONGER:
-            best, test = max(found, key=lambda one: one[0].nats)
-            if best.least >= _PLENTY or length * leading.samples > _LONGEST:
-                break
-            longer = replace(test, length=length)
-            found += [(proposal, longer) for proposal in tried(longer, len(tests) + length)]
+    found = [one for done, test in enumerate(tests) for one in tried(test, done)]
+    for length in _lengths(leading) if found else ():
+        best, test = max(found, key=lambda one: one[0].nats)
+        if best.least >= _PLENTY:
+            break
+        found += tried(replace(test, length=length), len(tests) + length)
     return sorted((proposal for proposal, _ in found), key=lambda p: -p.nats)
+
+
+def _lengths(leading: Leading) -> list[int]:
+    """How many times as long the best test may be; of a release or an imposed motion none."""
+    record = leading.nuisances.record
+    if not record.driven or record.drive != "force":
+        return []
+    return [length for length in _LONGER if length * leading.samples <= _LONGEST]
 
 
 def _tried(leading: Leading, test: Variation, words: str, key: jax.Array) -> list[Proposal]:
@@ -199,12 +154,9 @@ def same_force(one: Trial, other: Trial, nuisances: Nuisances) -> bool:
 
     Only what displacement and velocity tell is compared, of one degree of freedom.
     """
-    laws = [*one.laws, *other.laws]
-    if len(one.laws) != len(one.effects) or len(other.laws) != len(other.effects) or one.structure.dof > 1:
+    if not (_follows_state(one) and _follows_state(other)):
         return False
-    if not (one.laws and other.laws) or any(law.states or law.timed or law.delay is not None for law in laws):
-        return False
-    farthest = max(_LEVELS) * nuisances.crest * nuisances.length
+    farthest = max(LEVELS) * nuisances.crest * nuisances.length
     side = np.linspace(-1.0, 1.0, _SIDE)
     d, w = (a.ravel() for a in np.meshgrid(farthest * side, farthest * nuisances.omega * side))
 
@@ -215,7 +167,15 @@ def same_force(one: Trial, other: Trial, nuisances: Nuisances) -> bool:
     masses = [float(np.ravel(t.structure.mass)[0]) or 1.0 for t in (one, other)]
     per_mass = [force(t.structure.terms) / mass for t, mass in zip((one, other), masses, strict=True)]
     added = force(one.laws) / masses[0]
-    return _rms(per_mass[0] - per_mass[1]) < _SAME * _rms(added)
+    return bool(np.linalg.norm(per_mass[0] - per_mass[1]) < _SAME * np.linalg.norm(added))
+
+
+def _follows_state(t: Trial) -> bool:
+    """Whether a trial's effects are laws of displacement and velocity alone, of one degree of freedom."""
+    laws = t.laws
+    if not laws or len(laws) != len(t.effects) or t.structure.dof > 1:
+        return False
+    return not any(law.states or law.timed or law.delay is not None for law in laws)
 
 
 def separation(leading: Leading, record: Record) -> float:
@@ -245,56 +205,38 @@ def _made(leading: Leading, test: Variation, truth: Trial, rng: np.random.Genera
     sure = not any(_rests(rival.structure) for rival in leading.rivals)
 
     def followed(test: Variation):
-        plan = _plan(nuisances.record[: leading.samples], test, known=sure)
-        state = None if plan.driven else _start(truth, nuisances, test.level)
-        if plan.driven and rests:  # what is buckled rests in one of its wells
+        planned = planned_record(nuisances.record[: leading.samples], test, known=sure)
+        state = None if planned.driven else _start(truth, nuisances, test.level)
+        if planned.driven and rests:  # what is buckled rests in one of its wells
             state = np.array([at_rest(*rests[0])["x0@1", None].value]), np.zeros(1)
-        return plan, simulate(structure, plan, state, reconstruction=nuisances.reconstruction, solver="grid")
+        return planned, simulate(structure, planned, state, reconstruction=nuisances.reconstruction, solver="grid")
 
-    plan, response = followed(test)
+    planned, response = followed(test)
     known = replace(test, kind="") == Variation()
     harder = response if known else followed(replace(test, level=_SAFELY * test.level, length=1))[1]
     if not response.result == harder.result == Result.successful:
         return ()
-    shown = response.readings(plan)
-    levels = noise_levels(truth, nuisances)
-    share = float(np.median([levels[c] / s for c, s in zip(nuisances.channels, nuisances.spread, strict=True)]))
-    levels |= {channel: share * float(np.std(y)) for channel, y in shown.items() if channel not in levels}
-    clean = {channel: shown.get(channel, y) for channel, y in plan.channels.items()}
+    shown = response.readings(planned)
+    levels = _noise_of(truth, nuisances, shown)
+    clean = {channel: shown.get(channel, y) for channel, y in planned.channels.items()}
     seed = int(rng.integers(2**63))
     noisy = [
-        remeasured(plan, clean, {c: sign * level for c, level in levels.items()}, np.random.default_rng(seed))
+        remeasured(planned, clean, {c: sign * level for c, level in levels.items()}, np.random.default_rng(seed))
         for sign in (1.0, -1.0)
     ]
-    return remeasured(plan, clean, {}, rng), *noisy
+    return remeasured(planned, clean, {}, rng), *noisy
+
+
+def _noise_of(truth: Trial, nuisances: Nuisances, shown: Mapping[tuple, np.ndarray]) -> dict[tuple, float]:
+    """Standard deviation of every channel's noise in a test that shows this; of a new channel the same share."""
+    levels = noise_levels(truth, nuisances)
+    share = float(np.median([levels[c] / s for c, s in zip(nuisances.channels, nuisances.spread, strict=True)]))
+    return levels | {channel: share * float(np.std(y)) for channel, y in shown.items() if channel not in levels}
 
 
 def _rests(structure: Structure) -> list[tuple[tuple[int, int], float]]:
     """Where a structure of one mass may rest, other than at zero."""
     return structure.rests() if structure.dof == 1 else []
-
-
-def _plan(record: Record, test: Variation, *, known: bool = True) -> Record:
-    """Time and drive of a test, from rest where anything drives, with channels that hold nothing yet.
-
-    Where it rests is not `known` where that may be in one well or another.
-    """
-    time = record.time[0] + record.dt * np.arange(test.length * len(record)) / test.speed
-
-    def lasting(y: np.ndarray) -> np.ndarray:
-        return np.concatenate([y[::-1] if turn % 2 else y for turn in range(test.length)])
-
-    channels: dict[str, Any] = {}
-    for (kind, j), y in record.channels.items():
-        drives = (kind != "force") == (record.drive == "motion")
-        shift = test.shift * _rms(y) if kind == "force" else 0.0
-        channels.setdefault(kind, {})[j] = lasting(test.level * y + shift) if drives else np.zeros(time.size)
-    if test.kind:
-        channels[test.kind] = {j: np.zeros(time.size) for j in sorted({j for kind, j in record.responses})}
-    base = record.base_acceleration
-    if base is not None:
-        channels["base_acceleration"] = lasting(test.level * base)
-    return Record(time, **channels, at_rest=record.driven and known, drive=record.drive, units=dict(record.units))
 
 
 def _start(truth: Trial, nuisances: Nuisances, level: float) -> tuple[np.ndarray, np.ndarray]:
@@ -313,10 +255,6 @@ def _reach(leading: Leading, test: Record) -> float:
     there = leading.nuisances.record.answers
     channel = next(iter(there))
     return _peak(test.answers[channel]) / max(_peak(there[channel]), 1e-300)
-
-
-def _rms(y: np.ndarray) -> float:
-    return math.sqrt(float(np.mean(y**2)))
 
 
 def _peak(y: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""Channels whose noise has a memory: no motion, and no finding, but what sensors and amplifiers add."""
+"""Channels with autocorrelated noise: sensors and amplifiers add it, and it is neither motion nor a finding."""
 
 import math
 
@@ -24,27 +24,37 @@ _MOSTLY = 0.5
 
 
 def coloured(beside: Trial, problem: Problem) -> Problem | None:
-    """The problem, its channels' noise having a memory, where that alone is what a trial leaves; None otherwise.
+    """The problem with autocorrelated noise in its channels, where a trial leaves that alone; None otherwise.
 
-    That has to show in the innovations far above the motion, where what the model lacks leaves noise as it is; with the
-    memory they have to be white over half a period, and far likelier. The noise of the force is as strong as its own
-    spectrum lets it be, at most.
+    The correlation has to show in the innovations far above the motion, where what the model lacks leaves noise as it
+    is; once it is modelled they have to be white over half a period, and far likelier. The noise of the force is as
+    strong as its own spectrum lets it be, at most.
     """
     if problem.imposed or problem.first.colour is not None or white(beside):
         return None
-    posterior, count = problem.posterior_of(beside), len(problem.records)
-    falls = sum(np.array([rolloff(y).nats for y in standardised(posterior, beside.theta, i).T]) for i in range(count))
-    channels = np.flatnonzero(falls > _FALLS).tolist()
+    posterior = problem.posterior_of(beside)
+    channels = _falling(posterior, beside.theta)
     if not channels:
         return None
     loudest = max(_loudest(n, end) for n, end in zip(problem.records, problem.until, strict=True))
     other = problem.with_colour(posterior.colour(beside.theta, channels, loudest))
     again = other.posterior_of(beside)
     theta = again.at_the_floor(beside.theta)
-    before, after = (float(p.values(t[None])[0]) for p, t in ((posterior, beside.theta), (again, theta)))
-    if before - after < THRESHOLDS.searched:
+    if _cost(posterior, beside.theta) - _cost(again, theta) < THRESHOLDS.searched:
         return None
-    return other if all(_uncorrelated(again, theta, index) for index in range(count)) else None
+    return other if all(_uncorrelated(again, theta, index) for index in range(len(problem.records))) else None
+
+
+def _falling(posterior: Posterior, theta: np.ndarray) -> list[int]:
+    """Channels whose innovations grow weaker towards high frequencies, by the upper part of their spectra."""
+    records = range(len(posterior.records))
+    falls = sum(np.array([rolloff(y).nats for y in standardised(posterior, theta, i).T]) for i in records)
+    return np.flatnonzero(falls > _FALLS).tolist()
+
+
+def _cost(posterior: Posterior, theta: np.ndarray) -> float:
+    """Minus the logarithm of the posterior."""
+    return float(posterior.values(theta[None])[0])
 
 
 def _loudest(nuisances: Nuisances, until: int) -> float:

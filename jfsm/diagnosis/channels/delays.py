@@ -1,4 +1,4 @@
-"""Channels that are late by less than a sample, as every sensor may be: no finding, but time that is put right."""
+"""Channels that are late by less than a sample, as every sensor may be: they are no finding, and are shifted back."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ Late = Mapping[tuple[str, int], float]
 _STEP = 0.25
 """Samples by which a channel is read earlier and later."""
 _FARTHER = 4.0
-"""Times what a parabola about no delay tells that a longer one may gain."""
+"""Multiple of the gain by a parabola about no delay that a longer delay may reach."""
 
 
 def slightly_late(trials: Sequence[Trial], known: Late, dt: float) -> Late:
@@ -31,14 +31,19 @@ def slightly_late(trials: Sequence[Trial], known: Late, dt: float) -> Late:
     best = max(trials, key=lambda t: t.evidence)
     delays = [part for part in best.parts if isinstance(part, _DELAYS)]
     slight = all(abs(part.tau) < dt for part in delays)
-    more = {part.at: known.get(part.at, 0.0) + float(part.tau) for part in delays}
+    if not (delays and slight and best.evidence > _in_time_evidence(best, trials) + THRESHOLDS.significant):
+        return known
+    return {**known, **{part.at: known.get(part.at, 0.0) + float(part.tau) for part in delays}}
+
+
+def _in_time_evidence(best: Trial, trials: Sequence[Trial]) -> float:
+    """Log-evidence of the effects of a trial without its delays; minus infinity where nobody fitted them."""
     rest = tuple(effect for effect in best.effects if not issubclass(effect.cause.effect, _DELAYS))
-    without = max((t.evidence for t in trials if t.effects == rest), default=-math.inf)
-    return {**known, **more} if delays and slight and best.evidence > without + THRESHOLDS.significant else known
+    return max((t.evidence for t in trials if t.effects == rest), default=-math.inf)
 
 
 def seems_late(beside: Trial, problem: Problem) -> ChannelDelay | None:
-    """The delay, of less than a sample, of a channel that would have been far likelier beside a trial in time, if any.
+    """The delay, of less than a sample, of a channel that would make a trial without delays far likelier, if any.
 
     The trial's numbers stay: a parabola through what it is worth a quarter of a sample earlier and later.
     """
@@ -46,8 +51,7 @@ def seems_late(beside: Trial, problem: Problem) -> ChannelDelay | None:
         return None
     now, found = _cost(beside, problem), dict[tuple[str, int], tuple[float, float]]()
     for c, channel in enumerate(problem.first.channels):
-        earlier, later = (_cost(beside, _read_later(problem, c, samples)) for samples in (-_STEP, _STEP))
-        slope, curvature = (later - earlier) / 2, later + earlier - 2 * now
+        slope, curvature = _parabola(beside, problem, c, now)
         if curvature > 0 and abs(slope) * _STEP < curvature:
             found[channel] = slope**2 / (2 * curvature), -slope / curvature * _STEP
     most = max(found, key=lambda channel: found[channel], default=None)
@@ -63,10 +67,15 @@ def gain_of_delay(beside: Trial, channel: tuple[str, int], problem: Problem) -> 
     """
     if problem.imposed:
         return math.inf
-    c, now = problem.first.channels.index(channel), _cost(beside, problem)
-    earlier, later = (_cost(beside, _read_later(problem, c, samples)) for samples in (-_STEP, _STEP))
-    slope, curvature = (later - earlier) / 2, later + earlier - 2 * now
+    c = problem.first.channels.index(channel)
+    slope, curvature = _parabola(beside, problem, c, _cost(beside, problem))
     return _FARTHER * slope**2 / (2 * curvature) if curvature > 0 else math.inf
+
+
+def _parabola(t: Trial, problem: Problem, c: int, now: float) -> tuple[float, float]:
+    """Slope and curvature of a trial's cost, `now` without a delay, over the delay of a channel in steps."""
+    earlier, later = (_cost(t, _read_later(problem, c, samples)) for samples in (-_STEP, _STEP))
+    return (later - earlier) / 2, later + earlier - 2 * now
 
 
 def _cost(t: Trial, problem: Problem) -> float:
@@ -87,7 +96,7 @@ def _read_later(problem: Problem, c: int, samples: float) -> Problem:
 def in_time(
     training: Sequence[tuple[Record, int]], held: Sequence[HeldOut], late: Late
 ) -> tuple[list[tuple[Record, int]], list[HeldOut]]:
-    """What is fitted, and what is held out, with channels in time that are known to be late."""
+    """The fitted and the held-out records, with the channels shifted back that are known to be late."""
     if not late:
         return list(training), list(held)
 

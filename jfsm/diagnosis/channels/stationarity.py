@@ -1,4 +1,4 @@
-"""Whether a record is the work of one structure from its beginning to its end."""
+"""Stretches of a record that the structure of the rest does not predict."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ _BLOCKS, _FEWEST = 20, 8
 _WORSE = 5.0
 """Error of a block, in that of half of them, from which it is another structure's, or a sensor's that failed,"""
 _AT_AN_EDGE = 2.0
-"""and that from which a block beside a bad one is partly bad;"""
+"""and that from which a block next to a bad one is partly bad;"""
 _MATTERS = 0.05
 """if it is so much of the signal,"""
 _LOUDER = 2.0
@@ -52,18 +52,28 @@ def _bad_blocks(nuisances: Nuisances, channel: int, error: np.ndarray, free: np.
     blocks = [block[counted[block]] for block in np.array_split(np.arange(n), count)]
     if not all(block.size for block in blocks):
         return None
-    off, loud = (np.array([np.sqrt(np.mean(y[block] ** 2)) for block in blocks]) for y in (error, about))
+    off, loud = _rms(error, blocks), _rms(about, blocks)
     relative = off / np.hypot(nuisances.floor[channel], _MATTERS * loud)
     bad = (relative > _WORSE * np.median(relative)) & (off > _MATTERS * nuisances.spread[channel])
     bad = np.flatnonzero(bad & (loud < _LOUDER * np.median(loud)))
     if bad.size == 0:
         return None
-    first, last = bad[0], bad[-1]
-    while first > 0 and relative[first - 1] > _AT_AN_EDGE * np.median(relative):
-        first -= 1
-    while last < count - 1 and relative[last + 1] > _AT_AN_EDGE * np.median(relative):
-        last += 1
+    first, last = _widened(bad[0], bad[-1], relative > _AT_AN_EDGE * np.median(relative))
     begin, end = record.time[blocks[first][0]], record.time[blocks[last][-1]]
     if bad.size >= _LASTS * (count - bad[0]):
         return f"from {begin:.4g} s on"
     return f"between {begin:.4g} and {end:.4g} s"
+
+
+def _rms(y: np.ndarray, blocks: list[np.ndarray]) -> np.ndarray:
+    """Root mean square of samples in every block."""
+    return np.array([np.sqrt(np.mean(y[block] ** 2)) for block in blocks])
+
+
+def _widened(first: int, last: int, partly_bad: np.ndarray) -> tuple[int, int]:
+    """A range of blocks with the partly bad ones next to it."""
+    while first > 0 and partly_bad[first - 1]:
+        first -= 1
+    while last < partly_bad.size - 1 and partly_bad[last + 1]:
+        last += 1
+    return first, last

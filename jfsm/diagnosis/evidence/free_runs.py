@@ -1,4 +1,4 @@
-"""What mending the model is worth: free runs, or forces of an imposed motion, on readings that took no part.
+"""Gain of a mended model: free runs, or forces of an imposed motion, on readings that took no part in the fit.
 
 A structure that nothing holds in place drifts: its runs are many short ones.
 """
@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -33,6 +33,7 @@ _DRAWS = 4
 _BLOCK, _FEWEST, _MOST_BLOCKS = 2.0, 5, 20
 """Periods in a block of held-out readings where there are enough, and how many are drawn anew for an interval."""
 _RESAMPLED = 1000
+_ERRORS = ("before", "refitted", "after", "floor")
 BASE = ("base_acceleration", 0)
 """What stands for the acceleration of the base among channels."""
 
@@ -97,56 +98,86 @@ def measure_gain(
     holds the structure in place, which zeros wander, and what the force does between its samples. Where nothing holds
     it many short runs take the place of a long one.
     """
-    seed = np.random.default_rng(np.asarray(jax.random.key_data(key)).astype(np.uint32).tolist())
-    squares: dict[str, dict[tuple, list[float]]] = {
-        name: {} for name in ("before", "refitted", "after", "floor", "spread")
-    }
-    curves = []
-    pieces: list[np.ndarray] = []
-    wandering = [fitted.channels[c] for c in fitted.readings.wandering]
-    remembers = any(term.states or term.delay is not None for term in extended(None).terms)
+    rng = np.random.default_rng(np.asarray(jax.random.key_data(key)).astype(np.uint32).tolist())
+    compared = []
     for part in held:
         models = {"before": given, "refitted": refitted(part.of), "after": extended(part.of)}
-        period = fitted.period / part.record.dt
-        # What remembers shows at no instant: it is led to where a run begins, or would begin relaxed.
-        lead = math.ceil(_LEAD * period) if remembers else 0
-        record, begin = (part.record[part.begin :], 0) if fitted.drifts else part.led_by(lead)
-        record = _told(record, wandering, noise, seed)
-        stretches = _stretches(record, period) if fitted.drifts else [slice(0, len(record))]
-        window = _window(min(s.stop - s.start for s in stretches), period)
-        counted = _counted(record, stretches, window, begin)
-        run_of = partial(_run, stretches=stretches, window=window, reconstruction=fitted.reconstruction)
-        runs = {name: run_of(model, record) for name, model in models.items()}
-        left = _noise(partial(run_of, models["after"]), record, counted, runs["after"], noise, fitted.memories, seed)
-        off = {name: _off(run, record, counted, wandering) for name, run in runs.items()}
-        pieces += _blocks([off["before"], off["after"]], period)
-        for channel, y in record.answers.items():
-            for name, errors in off.items():
-                squares[name].setdefault(channel, []).append(float(np.mean(errors[channel] ** 2)))
-            squares["floor"].setdefault(channel, []).append(left[channel])
-            # At the end of a decay a digitised channel may show one level only.
-            spread = max(float(np.var(y[begin:])), noise.get(channel, 0.0) ** 2)
-            squares["spread"].setdefault(channel, []).append(spread)
-        curves.append({"record": record[begin:], **{name: _from(begin, run) for name, run in runs.items()}})
-    rms = {name: {c: math.sqrt(float(np.mean(v))) for c, v in table.items()} for name, table in squares.items()}
-    units = held[0].record.units
-    channels = {
-        f"{kind} {j}": ChannelGain(
-            units[kind], rms["spread"][kind, j], *(rms[n][kind, j] for n in ("before", "refitted", "after", "floor"))
-        )
-        for kind, j in rms["before"]
-    }
+        compared.append(_compared(part, models, noise, fitted, rng))
+    channels = _channel_gains([each.squares for each in compared], held[0].record.units)
     total = {
         name: math.sqrt(float(np.mean([(getattr(c, name) / c.spread) ** 2 for c in channels.values()])))
-        for name in ("before", "refitted", "after", "floor")
+        for name in _ERRORS
     }
     spreads = np.array([c.spread for c in channels.values()])
-    interval = _interval(np.mean(np.stack(pieces) / spreads**2, -1), total["floor"], seed)
-    return Gain(**total, channels=channels, interval=interval), curves
+    blocks = np.stack([block for each in compared for block in each.blocks])
+    interval = _interval(np.mean(blocks / spreads**2, -1), total["floor"], rng)
+    return Gain(**total, channels=channels, interval=interval), [each.curves for each in compared]
 
 
-def _told(record: Record, wandering: Sequence[tuple], noise: Mapping[tuple, float], rng) -> Record:
-    """The record as it tells of the motion: without torn readings, and without what is slow where a zero wanders.
+class _Compared(NamedTuple):
+    """Models compared on a held-out record.
+
+    `squares` are mean square errors by name and channel, with the channel's variance as its spread; `blocks` are those
+    of contiguous blocks (2, channels), before and after; `curves` are for the report.
+    """
+
+    squares: dict[str, dict[tuple, float]]
+    blocks: list[np.ndarray]
+    curves: dict[str, Any]
+
+
+def _compared(
+    part: HeldOut,
+    models: Mapping[str, Structure],
+    noise: Mapping[tuple, float],
+    fitted: Nuisances,
+    rng: np.random.Generator,
+) -> _Compared:
+    """Runs of models over a held-out record, with their errors and those that noise alone leaves."""
+    period = fitted.period / part.record.dt
+    wandering = [fitted.channels[c] for c in fitted.readings.wandering]
+    lead = _lead(models["after"], period)
+    record, begin = (part.record[part.begin :], 0) if fitted.drifts else part.led_by(lead)
+    record = _cleaned(record, wandering, noise, rng)
+    stretches = _stretches(record, period, drifts=fitted.drifts)
+    window = _window(min(s.stop - s.start for s in stretches), period)
+    counted = _counted(record, stretches, window, begin)
+    run_of = partial(_run, stretches=stretches, window=window, reconstruction=fitted.reconstruction)
+    runs = {name: run_of(model, record) for name, model in models.items()}
+    left = _noise(partial(run_of, models["after"]), record, counted, runs["after"], noise, fitted.memories, rng)
+    off = {name: _off(run, record, counted, wandering) for name, run in runs.items()}
+    squares = {name: {c: float(np.mean(error**2)) for c, error in errors.items()} for name, errors in off.items()}
+    # At the end of a decay a digitised channel may show one level only.
+    spread = {c: max(float(np.var(y[begin:])), noise.get(c, 0.0) ** 2) for c, y in record.answers.items()}
+    curves = {"record": record[begin:], **{name: _from(begin, run) for name, run in runs.items()}}
+    blocks = _blocks([off["before"], off["after"]], period)
+    return _Compared(squares | {"floor": left, "spread": spread}, blocks, curves)
+
+
+def _channel_gains(squares: Sequence[Mapping[str, Mapping[tuple, float]]], units: Any) -> dict[str, ChannelGain]:
+    """Root mean square errors of all records, by channel."""
+    channels = dict.fromkeys(channel for each in squares for channel in each["spread"])
+
+    def rms(name: str, channel: tuple) -> float:
+        return math.sqrt(float(np.mean([each[name][channel] for each in squares if channel in each[name]])))
+
+    return {
+        f"{c[0]} {c[1]}": ChannelGain(units[c[0]], rms("spread", c), *(rms(name, c) for name in _ERRORS))
+        for c in channels
+    }
+
+
+def _lead(structure: Structure, period: float) -> int:
+    """Samples that lead to a run, where periods have `period`.
+
+    What remembers shows at no instant: it is led to where a run begins, or would begin relaxed.
+    """
+    remembers = any(term.states or term.delay is not None for term in structure.terms)
+    return math.ceil(_LEAD * period) if remembers else 0
+
+
+def _cleaned(record: Record, wandering: Sequence[tuple], noise: Mapping[tuple, float], rng) -> Record:
+    """The record without torn readings, and without what is slow where a zero wanders.
 
     A run begins as it says, and is measured by it.
     """
@@ -158,10 +189,12 @@ def _told(record: Record, wandering: Sequence[tuple], noise: Mapping[tuple, floa
     return remeasured(record, shown, {}, rng)
 
 
-def _stretches(record: Record, period: float) -> list[slice]:
-    """Stretches of a record that are run one by one, as long as predictions are: in a longer one what nothing holds in
-    place drifts, however right the model."""
-    count = max(int(len(record) / ((FILTERED + PREDICTED) * period)), 1)
+def _stretches(record: Record, period: float, *, drifts: bool) -> list[slice]:
+    """Stretches of a record that are run one by one: the whole, or where a structure `drifts` as long as predictions.
+
+    In a longer one what nothing holds in place goes astray, however right the model.
+    """
+    count = max(int(len(record) / ((FILTERED + PREDICTED) * period)), 1) if drifts else 1
     ends = np.linspace(0, len(record), count + 1).astype(int).tolist()
     return [slice(*pair) for pair in itertools.pairwise(ends)]
 

@@ -1,4 +1,4 @@
-"""What noise leaves of a hypothesis: of records simulated from it, predicted as the measured one was.
+"""Prediction errors that noise alone leaves: records are simulated from a hypothesis and predicted by it.
 
 The filter tells it to first order, and from the noise that a channel was taken to have. Where a motion sticks, strikes
 or leaves a well, small errors grow otherwise; and where a channel's signal fills its band, only a fit tells its noise.
@@ -26,24 +26,13 @@ _DRAWS = 6
 
 def beside_chance(trials: Sequence[Trial], problem: Problem, key: jax.Array) -> list[Trial]:
     """The trials; the most probable, if its innovations are white and yet it leaves something, with draws of noise."""
-    model, records = problem.model, problem.records
     best = max(trials, key=lambda t: t.evidence)
-    limits = any(isinstance(sensor, Clipping) for sensor in model.sensors)
+    limits = any(isinstance(sensor, Clipping) for sensor in problem.model.sensors)
     if is_noise_only(best) or not white(best) or limits or problem.imposed or problem.limit.over:
         return list(trials)
-    posterior = problem.posterior_of(best)
-    runs = [free_run(posterior, best.theta, index) for index in range(len(records))]
-    if any(map(runs_away, runs, records)):
+    errors = _errors_of_noise(best, problem, key)
+    if errors is None:
         return list(trials)
-    levels = [noise_levels(best, n, index) for index, n in enumerate(records)]
-    seeds = np.asarray(jax.random.key_data(key)).astype(np.uint32).tolist()
-
-    def draw(rng: np.random.Generator) -> np.ndarray:
-        noisy = [_noisy(*parts, rng) for parts in zip(records, runs, levels, strict=True)]
-        again = problem.of(noisy, best.structure)
-        return predict(again.posterior_of(best), best.theta).error
-
-    errors = np.array(list(side_by_side(draw, np.random.default_rng(seeds).spawn(_DRAWS))))
     found = best.prediction
     prediction = Prediction(
         error=found.error,
@@ -51,6 +40,26 @@ def beside_chance(trials: Sequence[Trial], problem: Problem, key: jax.Array) -> 
         scatter=np.maximum(found.scatter, errors.std(0, ddof=1)),
     )
     return [replace(t, prediction=prediction) if t is best else t for t in trials]
+
+
+def _errors_of_noise(trial: Trial, problem: Problem, key: jax.Array) -> np.ndarray | None:
+    """Errors (draws, sets) with which a trial predicts records that are simulated from it, each with fresh noise.
+
+    None where it runs away.
+    """
+    posterior, records = problem.posterior_of(trial), problem.records
+    runs = [free_run(posterior, trial.theta, index) for index in range(len(records))]
+    if any(map(runs_away, runs, records)):
+        return None
+    levels = [noise_levels(trial, n, index) for index, n in enumerate(records)]
+    seeds = np.asarray(jax.random.key_data(key)).astype(np.uint32).tolist()
+
+    def draw(rng: np.random.Generator) -> np.ndarray:
+        noisy = [_noisy(*parts, rng) for parts in zip(records, runs, levels, strict=True)]
+        again = problem.of(noisy, trial.structure)
+        return predict(again.posterior_of(trial), trial.theta).error
+
+    return np.array(list(side_by_side(draw, np.random.default_rng(seeds).spawn(_DRAWS))))
 
 
 def noise_beyond(trials: Sequence[Trial], problem: Problem) -> np.ndarray:

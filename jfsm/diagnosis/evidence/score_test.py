@@ -12,7 +12,7 @@ import numpy as np
 from ..._threads import side_by_side
 from ...identification import Placed, Posterior
 from ...structures import AbstractSensor, AbstractTerm
-from ..hypotheses.candidates import Laws
+from ..hypotheses.placement import Laws
 from .fitted import Trial
 from .setup import Problem
 

@@ -7,8 +7,8 @@ from ..._limit import UNLIMITED, Limit
 from ...identification import Colour, Hypothesis, Nuisances, Posterior, prepare_all
 from ...records import Record
 from ...structures import Structure
-from ..hypotheses.candidates import Apart, hypothesis
 from ..hypotheses.initial_values import Begin
+from ..hypotheses.parametrisation import Apart, hypothesis
 from .fitted import Trial
 
 

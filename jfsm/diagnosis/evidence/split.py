@@ -1,4 +1,4 @@
-"""What of the records is fitted, and what is held out to measure the gain on."""
+"""Records split into a part that is fitted and a part that is held out to measure the gain on."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -39,25 +39,41 @@ class HeldOut:
 def split(
     record: Record | Sequence[Record], holdout, first: bool = False
 ) -> tuple[list[tuple[Record, int]], list[HeldOut]]:
-    """Records with the number of their samples that are fitted, and what is held out to measure the gain on.
+    """Records with the number of their samples that are fitted, and the records on which the gain is measured.
 
-    Of a share that is held back, the samples belong to the records and are predicted, or with `first` are not seen.
+    If `holdout` is a share, the samples belong to the records and are predicted, or with `first` are not seen.
     """
-    records = [record] if isinstance(record, Record) else list(record)
+    records = _checked(_as_list(record))
+    if not isinstance(holdout, int | float):
+        whole = [] if holdout is None else _as_list(holdout)
+        return [(r, len(r)) for r in records], [HeldOut(r) for r in whole]
+    if not 0 < holdout < 1:
+        raise ValueError(
+            f"`holdout` as a share must lie between 0 and 1, e.g. 0.3; got {holdout}. None keeps nothing back."
+        )
+    part = _first if first else _last
+    parts = [part(r, holdout, i) for i, r in enumerate(records)]
+    return [fitted for fitted, _ in parts], [held for _, held in parts]
+
+
+def _as_list(records: Record | Sequence[Record]) -> list[Record]:
+    return [records] if isinstance(records, Record) else list(records)
+
+
+def _checked(records: list[Record]) -> list[Record]:
+    """The records to fit.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If there are none, or one is no record.
+    """
     if not records:
         raise ValueError("`record` must hold at least one record; the sequence is empty.")
     for item in records:
         if not isinstance(item, Record):
             raise TypeError(f"`record` must be a jfsm.Record or a sequence of them; got {type(item).__name__}.")
-    if isinstance(holdout, int | float):
-        if not 0 < holdout < 1:
-            raise ValueError(
-                f"`holdout` as a share must lie between 0 and 1, e.g. 0.3; got {holdout}. None keeps nothing back."
-            )
-        parts = [(_first if first else _last)(r, holdout, i) for i, r in enumerate(records)]
-        return [fitted for fitted, _ in parts], [held for _, held in parts]
-    every = [] if holdout is None else [holdout] if isinstance(holdout, Record) else list(holdout)
-    return [(r, len(r)) for r in records], [HeldOut(r) for r in every]
+    return records
 
 
 def _first(record: Record, share: float, which: int) -> tuple[tuple[Record, int], HeldOut]:

@@ -1,4 +1,4 @@
-"""What had not been done when a diagnosis was ended, and how that is said."""
+"""The part of a diagnosis that was not done when it was ended, in words."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -12,19 +12,17 @@ _LISTED = 8
 
 
 class Unfinished(NamedTuple):
-    """Ids of the causes that had not been tried, and notes on all that had not been done; neither where nothing is."""
+    """Ids of the causes that were not tried, and notes on all that was not done; both empty where everything was."""
 
     untried: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, chosen: Mapping[str, Cause], tried: Searched, limit: Limit, *, cut: bool, pairs: bool) -> "Unfinished":
-        """What had not been done of a search that was `cut` short, or of what follows it."""
+        """The part of a search that was `cut` short that was not done, or of the work that follows it."""
         if cut:
-            dismissed = [behind.effects for behind in tried.behind if not behind.cut]
-            known = {e.cause.id for effects in (*(t.effects for t in tried.trials), *dismissed) for e in effects}
-            physical = (name for name, cause in chosen.items() if not cause.is_value and name != "clipping")
-            untried = tuple(name for name in physical if name not in known)
+            known = _known(tried)
+            untried = tuple(name for name in _to_be_fitted(chosen) if name not in known)
             follow = "what is akin to the best" + ", and pairs of causes" * pairs
             return cls(untried, (f"Not finished: {_count(untried)} Nor was all of what may follow: {follow}.",))
         if limit.over:
@@ -32,12 +30,22 @@ class Unfinished(NamedTuple):
         return cls()
 
 
+def _to_be_fitted(chosen: Mapping[str, Cause]) -> list[str]:
+    """Ids of the causes that only a fit can find."""
+    return [name for name, cause in chosen.items() if not cause.is_value and name != "clipping"]
+
+
+def _known(tried: Searched) -> set[str]:
+    """Ids of the causes that were fitted, or dismissed on good grounds."""
+    fitted = [t.effects for t in tried.trials]
+    dismissed = [behind.effects for behind in tried.behind if not behind.cut]
+    return {effect.cause.id for effects in (*fitted, *dismissed) for effect in effects}
+
+
 def _count(untried: tuple[str, ...]) -> str:
+    """The causes that were not tried, as a sentence."""
     if not untried:
         return "every cause was tried, though not wherever and with whatever it may act."
-    shown, more = ", ".join(untried[:_LISTED]), len(untried) - _LISTED
-    return (
-        f"{len(untried)} causes were not tried to the end: {shown}"
-        + f" and {more} more." * (more > 0)
-        + "." * (more <= 0)
-    )
+    more = len(untried) - _LISTED
+    rest = f" and {more} more." if more > 0 else "."
+    return f"{len(untried)} causes were not tried to the end: {', '.join(untried[:_LISTED])}{rest}"

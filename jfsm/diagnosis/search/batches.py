@@ -14,7 +14,7 @@ from ...identification import LADDER, LANES, Maximum, Posterior, finish, lanes_o
 from ...structures import AccelerationGain, ForceGain, Structure
 from ..evidence.fitted import Trial, trial
 from ..evidence.setup import Problem
-from ..hypotheses.candidates import Candidate
+from ..hypotheses.candidate import Candidate
 from ..hypotheses.effect import Effect, families
 from ..hypotheses.initial_values import Begin
 

@@ -19,9 +19,11 @@ from ..evidence.fitted import Trial
 from ..evidence.own_values import at_bounds
 from ..evidence.score_test import promised
 from ..evidence.setup import Problem
-from ..hypotheses.candidates import SHAPES, Candidate, Laws, natural_starts
+from ..hypotheses.candidate import Candidate
 from ..hypotheses.effect import Effect
 from ..hypotheses.initial_values import Begin, found_in
+from ..hypotheses.natural_starts import natural_starts
+from ..hypotheses.placement import SHAPES, Laws
 from .related_laws import other_delay
 
 _BASES = 5

@@ -18,9 +18,10 @@ from ..evidence.excess import is_noise_only
 from ..evidence.fitted import Trial
 from ..evidence.score_test import promised
 from ..evidence.setup import Problem
-from ..hypotheses.candidates import SHAPES, Candidate, Laws, alone_there, at_rest, contained, may_rest_anywhere
+from ..hypotheses.candidate import Candidate, alone_there, contained
 from ..hypotheses.effect import Effect
 from ..hypotheses.initial_values import Begin, found_in, own_part
+from ..hypotheses.placement import SHAPES, Laws, at_rest, may_rest_anywhere
 from ..thresholds import THRESHOLDS
 
 _BESIDE_A_SPRING: Mapping[type[AbstractTerm], type[AbstractTerm]] = {EndStop: DeadZone, DeadZone: EndStop}

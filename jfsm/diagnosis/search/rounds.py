@@ -18,7 +18,7 @@ from ..evidence.identifiable import in_step
 from ..evidence.lack_of_fit import LackOfFit
 from ..evidence.noise_draws import beside_chance, noise_beyond
 from ..evidence.setup import Problem
-from ..hypotheses.candidates import Candidate, as_promising, contained, elsewhere, promising
+from ..hypotheses.candidate import Candidate, as_promising, contained, elsewhere, promising
 from ..hypotheses.effect import Effect
 from ..thresholds import THRESHOLDS
 from .baseline import refit_from

@@ -11,7 +11,7 @@ from ..evidence.excess import explained, is_noise_only
 from ..evidence.fitted import Trial
 from ..evidence.own_values import at_bounds
 from ..evidence.setup import Problem
-from ..hypotheses.candidates import Candidate
+from ..hypotheses.candidate import Candidate
 from ..hypotheses.effect import Effect, families
 from ..hypotheses.initial_values import found_in, own_part
 from ..thresholds import THRESHOLDS

@@ -18,7 +18,9 @@ from ..evidence.excess import white
 from ..evidence.fitted import Trial
 from ..evidence.lack_of_fit import LackOfFit
 from ..evidence.setup import Problem
-from ..hypotheses.candidates import Apart, Candidate, candidates
+from ..hypotheses.candidate import Candidate
+from ..hypotheses.candidates import candidates
+from ..hypotheses.parametrisation import Apart
 from ..thresholds import THRESHOLDS
 from .baseline import believed, refit_from
 from .rounds import Rounds, Searched, amid_noise
