@@ -13,7 +13,7 @@ from ..records import Record
 from ..reporting import shown_by_default
 from ..structures import Cause, Structure
 from ._diagnosis import Diagnosis
-from .advice.detection_limits import Silence, detectable, naturally_detectable
+from .advice.detection_limits import Silence, Smallest, detectable, naturally_detectable
 from .advice.next_test import Leading
 from .channels.clipping import limited
 from .channels.delays import Late, in_time, showing_late, slightly_late
@@ -152,12 +152,8 @@ def _diagnosed(
     lacking = refitted.structure if term is None else winner.structure.without(term)
     at = term.at if term is not None and term.at in lacking.links else None
     missing = residual(lacking, steadied(first), fitted, at)
-    silence = Silence(tried.given, refitted, judged)
     steps.next("what would have been seen")
-    if decision.verdict in ("consistent", "undecided"):  # silence is worth what would have been heard
-        seen = naturally_detectable(every, silence)
-    else:
-        seen = detectable(tried.trials, silence)
+    seen = _would_have_been_seen(decision.verdict, every, tried, judged)
     if decision.verdict != "consistent":
         extended = showing_late(extended, late)
     unfinished = Unfinished.of(chosen, tried, limit, cut=not decision.finished, pairs=study.pairs)
@@ -166,6 +162,15 @@ def _diagnosed(
     steps.end()
     reached = Reached(decision, winner, term, weighed.evidence)
     return assemble(reached, clipped, refitted, tested, judged, extended, missing, gain, runs, leading)
+
+
+def _would_have_been_seen(verdict: str, every: list[Candidate], found: Searched, problem: Problem) -> list[Smallest]:
+    """The smallest effects that would have shown: of every candidate where none was named, since silence is worth what
+    would have been heard."""
+    silence = Silence(found.given, found.refitted, problem)
+    if verdict in ("consistent", "undecided"):
+        return naturally_detectable(every, silence)
+    return detectable(found.trials, silence)
 
 
 def _looked_into(

@@ -90,14 +90,14 @@ def _akin_to(t: Trial, every: Sequence[Candidate], problem: Problem) -> list[Can
 
 def _in_place_of(close: Sequence[Trial], every: Sequence[Candidate], known: Found, problem: Problem) -> list[Candidate]:
     """What is less probable so far than a law that it may take the place of."""
-    evidence = dict.fromkeys((c.effects for c in every), -math.inf) | {t.effects: t.evidence for t in known.trials}
+    evidence = {c.effects: -math.inf for c in every} | {t.effects: t.evidence for t in known.trials}
     tried = list[Candidate]()
     ranked = _ranked(close if any(map(is_noise_only, close)) else known.trials)
     near = _close_to(ranked[0], known.trials) if ranked else {}
     for t in ranked:
         behind = [c for c in every if evidence[c.effects] < t.evidence]
-        new = [c for law in t.laws for c in instead_of(t, law, behind, near, problem)]
-        evidence |= dict.fromkeys((c.effects for c in new), math.inf)  # tried once
+        new = list(chain.from_iterable(instead_of(t, law, behind, near, problem) for law in t.laws))
+        evidence |= {c.effects: math.inf for c in new}  # tried once
         tried, near = tried + new, {}
     return tried
 
