@@ -18,6 +18,7 @@ ROOMS = (
     "_limit",
     "_threads",
     "_programs",
+    "_map_reader",
     "reporting",
     "records",
     "structures",
@@ -60,7 +61,10 @@ def imported_modules(name: str, path: Path, known: set[str], *, at_load: bool) -
         if at_load and runs_later(node):
             continue
         pending.extend(ast.iter_child_nodes(node))
-        if isinstance(node, ast.Import):
+        if isinstance(node, ast.Call) and ast.unparse(node.func).split(".")[-1] in ("import_module", "__import__"):
+            names = [part.value for part in node.args if isinstance(part, ast.Constant)]
+            yield from ((name, node.lineno) for name in names if name in known)
+        elif isinstance(node, ast.Import):
             yield from ((alias.name, node.lineno) for alias in node.names if alias.name in known)
         elif isinstance(node, ast.ImportFrom):
             base = package[: len(package) + 1 - node.level] if node.level else []
@@ -148,6 +152,8 @@ def test_no_modules_of_a_room_import_each_other_in_a_circle_at_any_time(room):
         "from jfsm import diagnosis",
         "def late():\n    from ..diagnosis import diagnose",
         "from jfsm import diagnose",
+        "import importlib\nimportlib.import_module('jfsm.diagnosis')",
+        "def late():\n    return import_module('jfsm.diagnosis').diagnose",
     ],
 )
 def test_an_import_from_a_lower_room_is_seen_however_it_is_written(tmp_path, statement):
