@@ -22,9 +22,9 @@ from ..dynamics._plant import Channel, Readout, lower, readout
 from ..dynamics._simulate import check_pair
 from ..dynamics._start import starting_state
 from ..estimation._filter import ProcessNoise, Readings, Stretch
-from ..records import Record, clipped, noise_floor, quantisation_step, spikes
+from ..records import Record, clipped, driving, noise_floor, quantisation_step, spikes
 from ..structures import Structure
-from ._channels import LEAST_NOISE, driving, forces, readings_of, spread_of
+from ._channels import LEAST_NOISE, forces, readings_of, spread_of
 from ._colour import Colour
 
 LEAST_SAMPLES = 32
