@@ -55,6 +55,7 @@ from ..plant import (
     undelayed,
     with_friction,
 )
+from ._measurement_update import measurement_update
 
 _NOTHING = 1e-6
 """Change of a resting link's speed that is none, as a share of what the process noise makes of it in a sample."""
@@ -502,11 +503,7 @@ def _update(
             share = jnp.where(channel == c, 0.0, share)
         error = reading - gain * predicted - plant.channel_offset[c]
         row = jnp.concatenate([gain * row, mine])
-        cross = jnp.sum(covariance * row[None, :], 1)
-        spread = jnp.sum(row * cross) + variances[c]
-        weight = use[c] * cross / spread
-        mean = mean + weight * error
-        covariance = covariance - weight[:, None] * cross[None, :]
+        mean, covariance, spread, _ = measurement_update(mean, covariance, row, error, variances[c], use[c])
         errors.append(error)
         spreads.append(spread)
         shares.append(share)

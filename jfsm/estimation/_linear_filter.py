@@ -4,8 +4,8 @@ The covariance of a linear plant does not depend on what is read. So lanes that 
 them or in the zeros of their sensors share its gains, and only their means go through the samples. A covariance that
 has settled is kept, with its gains, while the same channels are read.
 
-The readings of a sample are taken together, by the factors of their covariance. Errors and variances are still those of
-one reading after the other, of which one that is not used tells the later ones nothing.
+A sample's readings are taken one after the other, and what they make of the mean is kept as a matrix: the update of
+every mean at once. A reading that is not used tells the later ones nothing.
 """
 
 from typing import NamedTuple
@@ -17,6 +17,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from ..plant import Observation, Plant, inverse_mass, times
 from ._filter import Assumed, Known, beside, short_transition, transition, zeros_of
+from ._measurement_update import measurement_update
 
 _SETTLED = 1e-12
 """Change of a covariance in a sample, in standard deviations, that is none. What is still to come is that times the
@@ -169,16 +170,22 @@ def _learned(law: Law, covariance, use):
     """Gains (channels + state, channels), variances, and the covariance a sample later.
 
     Of differences between readings and what was predicted before the sample, gains make those of one reading after the
-    other, and below what all used ones add to the state a sample later.
+    other, and below what all used ones add to the state a sample later. The loop over channels keeps programs small.
     """
-    cross = covariance @ law.shown.T
-    between = law.shown @ cross + jnp.diag(law.noise)
-    own, used = jnp.diagonal(between), use[None, :]
-    root = jnp.linalg.cholesky(jnp.where(jnp.eye(use.size, dtype=bool), between, between * use[:, None] * used))
-    inverse = jax.scipy.linalg.solve_triangular(root, jnp.eye(use.size), lower=True)
-    of_readings, of_state = jnp.tril(between * used @ inverse.T, -1), cross * used @ inverse.T
-    apart = jnp.eye(use.size) - of_readings @ inverse
-    ahead = law.transition @ (of_state @ inverse * used)
-    updated = covariance - of_state @ of_state.T
+    channels, size = law.shown.shape
+
+    def read(known, channel):
+        moved, covariance = known
+        row, of_reading, noise, counted = channel
+        error = of_reading - jnp.sum(row[:, None] * moved, 0)
+
+        def update(mean, error):
+            return tuple(measurement_update(mean, covariance, row, error, noise, counted))
+
+        moved, updated, variance, _ = jax.vmap(update, (1, 0), (1, None, None, None))(moved, error)
+        return (moved, updated), (error, variance)
+
+    each = law.shown, jnp.eye(channels), law.noise, use
+    (moved, updated), (apart, variance) = jax.lax.scan(read, (jnp.zeros((size, channels)), covariance), each)
     after = law.spread @ updated @ law.spread.T + law.added
-    return jnp.concatenate([apart, ahead]), own - jnp.sum(of_readings**2, 1), after
+    return jnp.concatenate([apart, law.transition @ moved]), variance, after
