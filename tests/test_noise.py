@@ -7,7 +7,8 @@ import pytest
 
 import jfsm
 from jfsm.diagnosis.channels.clipping import limited
-from jfsm.records import clipped, driving, noise_floor, spikes
+from jfsm.identification._channels import driving
+from jfsm.records import clipped, noise_floor, spikes
 from jfsm.records._flat_top import flat_top_std
 from jfsm.records._resting import resting_std
 

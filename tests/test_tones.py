@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.estimation._part import Part
 from jfsm.identification import Hypothesis, Posterior, prepare
-from jfsm.records import driving, noise_floor, tones
+from jfsm.records import noise_floor, tones
 
 N, DT = 3000, 0.01
 TIME = DT * np.arange(N)
@@ -61,16 +60,6 @@ def steady(omega):
     force = np.exp(1j * omega * TIME)
     x = force / (STIFFNESS + 1j * omega * DAMPING - omega**2 * MASS)
     return force.real, (-(omega**2) * x).real
-
-
-def test_a_motion_is_estimated_from_the_same_drive_and_noise_as_a_structure_is_fitted_with():
-    clean, (_, acceleration) = DRIVES["orders"], steady(9.0)
-    record = jfsm.Record(TIME, with_noise(clean), acceleration=with_noise(acceleration, seed=1))
-    drive, part = driving(record.channels["force", 1], DT), Part.of_dof(record, 1)
-    size = np.std(drive.samples) / np.std(part.drive[:, 0])
-    np.testing.assert_allclose(size * part.drive[:, 0], drive.samples, rtol=1e-12, atol=1e-12)
-    assert size * part.rough[0] == pytest.approx(np.sqrt(drive.by_sample), rel=1e-12)
-    assert np.std(drive.samples - clean) < 2 * np.sqrt(drive.by_sample)  # which a spline would exceed several times
 
 
 @pytest.mark.parametrize("omega", [4.0, 9.0, 14.0])

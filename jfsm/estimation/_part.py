@@ -7,13 +7,17 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..plant import Plant, bucket, direction, fastest_mode, lower, measured_force
-from ..records import Record, clipped, driving, noise_floor, spikes
+from ..records import Record, clipped, noise_floor, spikes
 from ..structures import Structure
 from ._observable import Place, told_apart
 from ._resonator import Data, Kind, Numbers
 
 _RESPONSES = ("displacement", "velocity", "acceleration")
+_OVERSAMPLED = 3
+"""Samples per knot from which a spline's curve may stand for a force."""
 _LEAST_NOISE = 1e-4
+_FULL_BAND = 1e-3
+"""Noise of a force whose signal fills its band, as a share of its size at most: nothing in it tells."""
 _WIDE, _AT_REST = 10.0, 1e-6
 """Standard deviation of the first state beforehand, in sizes of the motion."""
 STEADY = -30.0
@@ -151,15 +155,21 @@ def levers(model: Structure, loads: Sequence[Place]) -> tuple[np.ndarray, np.nda
 
 
 def _forces(record: Record, dof: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Force samples (n, dof) without the noise that smoothing takes away; the standard deviation of what is left in a
-    sample, and the doubt about its logarithm."""
+    """Force samples (n, dof), smoothed where their noise shows above the signal's band; the standard deviation of the
+    noise that is left, and the doubt about its logarithm."""
     rough, vague = np.ones(dof), np.ones(dof)
     if record.drive == "motion":
         return np.zeros((len(record), dof)), rough, vague
     force = measured_force(record, dof)
     for j in range(dof):
         if np.any(force[:, j]):
-            least, found = _LEAST_NOISE * np.std(force[:, j]), driving(force[:, j], record.dt)
-            force[:, j] = found.samples
-            rough[j], vague[j] = max(np.sqrt(found.by_sample), least), 1.0 if found.told else 3.0
+            floor = noise_floor(force[:, j], record.dt)
+            if floor.fills_band or floor.silent:
+                rough[j], vague[j] = min(floor.std, _FULL_BAND * np.std(force[:, j])), 3.0
+            elif floor.spacing < _OVERSAMPLED:
+                rough[j] = floor.std
+            else:
+                force[:, j] = floor.smooth
+                rough[j] = floor.std * np.sqrt(floor.effective_parameters / len(record))
+            rough[j] = max(rough[j], _LEAST_NOISE * np.std(force[:, j]))
     return force, rough, vague

@@ -7,13 +7,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ..plant import Channel, force_limits, measured_force
-from ..records import NoiseFloor, Record, bridged, clipped, declipped, defects, driving, noise_floor, spikes
+from ..records import NoiseFloor, Record, bridged, clipped, declipped, defects, noise_floor, spikes, tones
 from ..structures import Structure
 
 LEAST_NOISE = 1e-4
 """Noise of a channel as a share of its size, at least: below it the integration error would be taken for physics."""
 _BAND_LIMITED = 1e-3
 """Noise of a channel whose signal fills its band, as a share of its size: nothing in it tells."""
+_OVERSAMPLED = 3
+"""Samples per knot from which a spline's curve may stand for the force: the band above holds noise only."""
 _MOSTLY = 0.5
 _SAME = 1e-9
 """Rounding, relative."""
@@ -30,6 +32,19 @@ class ChannelReadings(NamedTuple):
     floor: np.ndarray
     trusted: np.ndarray
     notes: list[str]
+
+
+class Driving(NamedTuple):
+    """Samples (n,) of a channel that drives, to run with, and their noise.
+
+    `floor` is the standard deviation with which they were measured; `by_sample` the variance that smoothing leaves in a
+    sample, and `in_motion` that of white noise as strong as what it leaves where the structure moves.
+    """
+
+    samples: np.ndarray
+    floor: float
+    by_sample: float
+    in_motion: float
 
 
 class Forces(NamedTuple):
@@ -101,7 +116,25 @@ def forces(record: Record, model: Structure) -> tuple[Forces, list[str]]:
             notes.append(
                 f"force {j} looks clipped; its true peaks are not known, which shows as an unexplained effect."
             )
-        found = driving(force[:, j - 1], record.dt)
-        force[:, j - 1], std[j - 1] = found.samples, found.floor
-        by_sample[j - 1], in_motion[j - 1] = found.by_sample, found.in_motion
+        force[:, j - 1], std[j - 1], by_sample[j - 1], in_motion[j - 1] = driving(force[:, j - 1], record.dt)
     return Forces(force, std, by_sample, in_motion), notes
+
+
+def driving(samples: np.ndarray, dt: float) -> Driving:
+    """What drives, as a channel tells it.
+
+    Where it is smooth on its own grid, its noise is smoothed away. A spline leaves all of it in the band of the motion,
+    a sum of tones next to nothing. A signal that reaches farther up stays as it was measured; if it fills the band,
+    nothing tells its noise, which is taken as a thousandth of it.
+    """
+    floor = noise_floor(samples, dt)
+    full = floor.fills_band or floor.silent
+    if full or floor.spacing < _OVERSAMPLED:
+        size = float(np.std(samples))
+        std = _BAND_LIMITED * size if full else max(floor.std, LEAST_NOISE * size)
+        return Driving(samples, std, std**2, std**2)
+    few = tones(samples, floor)
+    parameters = floor.effective_parameters if few is None else few.parameters
+    by_sample = floor.std**2 * parameters / samples.size
+    curve, in_motion = (floor.smooth, floor.std**2) if few is None else (few.curve, by_sample)
+    return Driving(curve, floor.std, by_sample, in_motion)

@@ -29,9 +29,9 @@ from ..plant import (
     substeps_for,
     typical_size,
 )
-from ..records import Record, clipped, driving, noise_floor, quantisation_step, spikes
+from ..records import Record, clipped, noise_floor, quantisation_step, spikes
 from ..structures import Structure
-from ._channels import LEAST_NOISE, forces, readings_of, spread_of
+from ._channels import LEAST_NOISE, driving, forces, readings_of, spread_of
 from ._colour import Colour
 
 LEAST_SAMPLES = 32

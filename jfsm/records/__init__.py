@@ -8,8 +8,6 @@ from jfsm.records._defects import bridged as bridged
 from jfsm.records._defects import clipped as clipped
 from jfsm.records._defects import defects as defects
 from jfsm.records._defects import spikes as spikes
-from jfsm.records._driving import Driving as Driving
-from jfsm.records._driving import driving as driving
 from jfsm.records._noise_floor import NoiseFloor as NoiseFloor
 from jfsm.records._noise_floor import noise_floor as noise_floor
 from jfsm.records._quantisation import quantisation_step as quantisation_step
