@@ -125,7 +125,7 @@ def private_imports(package: Path) -> list[str]:
 def import_cycle(package: Path, room: str = "", *, at_load: bool = True) -> list[str] | None:
     """Modules, of one room if named, that import each other (`at_load`: as they are loaded), or None."""
     files = module_files(package)
-    inside = [name for name in files if f"{name}.".startswith(f"{package.name}.{room}.".replace("..", "."))]
+    inside = [name for name in files if not room or name.split(".")[1:2] == [room]]
     graph = {
         name: {target for target, _ in imported_modules(name, files[name], set(files), at_load=at_load)} - {name}
         for name in inside

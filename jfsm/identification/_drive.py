@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..plant import InterpolatedInput
+from ..plant import InterpolatedInput, cubic_weights
 
 
 def between_samples(force: np.ndarray, halves: int, count: int) -> np.ndarray:
@@ -40,13 +40,7 @@ def _in_a_row(values: np.ndarray) -> np.ndarray:
 def _shifted(values: np.ndarray, places: float) -> np.ndarray:
     """Values so many places further on, by the cubic through four neighbours."""
     whole = int(np.floor(places))
-    s = places - whole
-    weights = (
-        -s * (s - 1) * (s - 2) / 6,
-        (s + 1) * (s - 1) * (s - 2) / 2,
-        -(s + 1) * s * (s - 2) / 2,
-        (s + 1) * s * (s - 1) / 6,
-    )
+    weights = cubic_weights(places - whole)
     index, last = np.arange(values.size) + whole, values.size - 1
     near = np.stack([values[np.clip(index + k, 0, last)] for k in (-1, 0, 1, 2)])
     return np.asarray(weights) @ near

@@ -28,6 +28,7 @@ from ._grid import DelayBuffer as DelayBuffer
 from ._grid import InterpolatedInput as InterpolatedInput
 from ._grid import advance_sample as advance_sample
 from ._grid import begin as begin
+from ._grid import cubic_weights as cubic_weights
 from ._grid import drive_before as drive_before
 from ._grid import free_run as free_run
 from ._grid import load_of as load_of

@@ -74,16 +74,20 @@ def _in_a_row(values: Float[Array, "n halves columns"]) -> Float[Array, "nodes c
     return jnp.concatenate([values[:, :-1].reshape(-1, values.shape[2]), values[-1:, -1]])
 
 
-def shifted(values: Float[Array, " n"], places: Float[Array, ""]) -> Float[Array, " n"]:
-    """Values so many places further on, by the cubic through four neighbours."""
-    whole = jax.lax.stop_gradient(jnp.floor(places))
-    s = places - whole
-    weights = (
+def cubic_weights(s: Any) -> tuple[Any, Any, Any, Any]:
+    """Weights of the samples at -1, 0, 1 and 2 in the cubic through them, at `s` between 0 and 1 (Lagrange)."""
+    return (
         -s * (s - 1) * (s - 2) / 6,
         (s + 1) * (s - 1) * (s - 2) / 2,
         -(s + 1) * s * (s - 2) / 2,
         (s + 1) * s * (s - 1) / 6,
     )
+
+
+def shifted(values: Float[Array, " n"], places: Float[Array, ""]) -> Float[Array, " n"]:
+    """Values so many places further on, by the cubic through four neighbours."""
+    whole = jax.lax.stop_gradient(jnp.floor(places))
+    weights = cubic_weights(places - whole)
     index = jnp.arange(values.size) + whole.astype(int)
     last = values.size - 1
     near = jnp.stack([values[jnp.clip(index + k, 0, last)] for k in (-1, 0, 1, 2)])

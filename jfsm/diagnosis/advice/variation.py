@@ -69,7 +69,6 @@ def planned_record(record: Record, test: Variation, *, known: bool = True) -> Re
     Where it rests is not `known` where that may be in one well or another.
     """
     time = record.time[0] + record.dt * np.arange(test.length * len(record)) / test.speed
-
     channels: dict[str, Any] = {}
     for (kind, j), y in record.channels.items():
         shift = test.shift * _rms(y) if kind == "force" else 0.0

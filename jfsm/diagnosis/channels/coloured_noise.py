@@ -7,7 +7,7 @@ import numpy as np
 from ...identification import Nuisances, Posterior
 from ...records import rolloff
 from ..evidence.excess import white
-from ..evidence.fitted import Trial, standardised
+from ..evidence.fitted import Trial, cost, standardised
 from ..evidence.setup import Problem
 from ..thresholds import THRESHOLDS
 
@@ -40,7 +40,7 @@ def coloured(beside: Trial, problem: Problem) -> Problem | None:
     other = problem.with_colour(posterior.colour(beside.theta, channels, loudest))
     again = other.posterior_of(beside)
     theta = again.at_the_floor(beside.theta)
-    if _cost(posterior, beside.theta) - _cost(again, theta) < THRESHOLDS.searched:
+    if cost(posterior, beside.theta) - cost(again, theta) < THRESHOLDS.searched:
         return None
     return other if all(_uncorrelated(again, theta, index) for index in range(len(problem.records))) else None
 
@@ -50,11 +50,6 @@ def _falling(posterior: Posterior, theta: np.ndarray) -> list[int]:
     records = range(len(posterior.records))
     falls = sum(np.array([rolloff(y).nats for y in standardised(posterior, theta, i).T]) for i in records)
     return np.flatnonzero(falls > _FALLS).tolist()
-
-
-def _cost(posterior: Posterior, theta: np.ndarray) -> float:
-    """Minus the logarithm of the posterior."""
-    return float(posterior.values(theta[None])[0])
 
 
 def _loudest(nuisances: Nuisances, until: int) -> float:

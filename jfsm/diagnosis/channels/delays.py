@@ -9,7 +9,7 @@ import numpy as np
 from ...identification import Nuisances
 from ...records import Record, advanced
 from ...structures import ChannelDelay, ForceDelay, Structure
-from ..evidence.fitted import Trial
+from ..evidence.fitted import Trial, cost
 from ..evidence.setup import Problem
 from ..evidence.split import HeldOut
 from ..thresholds import THRESHOLDS
@@ -49,7 +49,7 @@ def seems_late(beside: Trial, problem: Problem) -> ChannelDelay | None:
     """
     if problem.imposed:
         return None
-    now, found = _cost(beside, problem), dict[tuple[str, int], tuple[float, float]]()
+    now, found = cost(problem.posterior_of(beside), beside.theta), dict[tuple[str, int], tuple[float, float]]()
     for c, channel in enumerate(problem.first.channels):
         slope, curvature = _parabola(beside, problem, c, now)
         if curvature > 0 and abs(slope) * _STEP < curvature:
@@ -68,18 +68,15 @@ def gain_of_delay(beside: Trial, channel: tuple[str, int], problem: Problem) -> 
     if problem.imposed:
         return math.inf
     c = problem.first.channels.index(channel)
-    slope, curvature = _parabola(beside, problem, c, _cost(beside, problem))
+    slope, curvature = _parabola(beside, problem, c, cost(problem.posterior_of(beside), beside.theta))
     return _FARTHER * slope**2 / (2 * curvature) if curvature > 0 else math.inf
 
 
 def _parabola(t: Trial, problem: Problem, c: int, now: float) -> tuple[float, float]:
     """Slope and curvature of a trial's cost, `now` without a delay, over the delay of a channel in steps."""
-    earlier, later = (_cost(t, _read_later(problem, c, samples)) for samples in (-_STEP, _STEP))
+    moved = (_read_later(problem, c, samples) for samples in (-_STEP, _STEP))
+    earlier, later = (cost(other.posterior_of(t), t.theta) for other in moved)
     return (later - earlier) / 2, later + earlier - 2 * now
-
-
-def _cost(t: Trial, problem: Problem) -> float:
-    return float(problem.posterior_of(t).values(t.theta[None])[0])
 
 
 def _read_later(problem: Problem, c: int, samples: float) -> Problem:

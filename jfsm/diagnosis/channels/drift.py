@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...identification import Nuisances, Posterior
-from ..evidence.fitted import Trial, standardised
+from ..evidence.fitted import Trial, cost, standardised
 from ..evidence.setup import Problem
 from ..thresholds import THRESHOLDS
 
@@ -31,8 +31,8 @@ def wandering(beside: Trial, problem: Problem, least: float) -> int | None:
     if shares[channel] < least:
         return None
     wandered = problem.with_wandering(channel).posterior_of(beside)
-    before, after = (float(one.values(beside.theta[None])[0]) for one in (posterior, wandered))
-    return channel if before - after > THRESHOLDS.searched else None
+    gain = cost(posterior, beside.theta) - cost(wandered, beside.theta)
+    return channel if gain > THRESHOLDS.searched else None
 
 
 def _slow(posterior: Posterior, beside: Trial, index: int) -> np.ndarray:

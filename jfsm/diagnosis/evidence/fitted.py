@@ -231,6 +231,11 @@ def extent(nuisances: Nuisances) -> np.ndarray:
     return np.minimum(np.std(about[free], 0), nuisances.spread)
 
 
+def cost(posterior: Posterior, theta: np.ndarray) -> float:
+    """Minus the logarithm of the posterior at one set of unknowns."""
+    return float(posterior.values(theta[None])[0])
+
+
 def standardised(posterior: Posterior, theta: np.ndarray, index: int) -> np.ndarray:
     """Innovations (until, channels) of what was fitted, in their standard deviations; none where no reading counts."""
     until, found = posterior.until[index], posterior.innovations(theta, index)

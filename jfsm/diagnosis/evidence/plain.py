@@ -12,7 +12,6 @@ def as_plain(value: Any, *, lossless: bool = True) -> Any:
     Numbers without bounds, which JSON does not have, are their names, from which `float` makes them again; None if it
     need not be `lossless`.
     """
-
     value = _built_in(value)
     if isinstance(value, dict):
         return {name: as_plain(each, lossless=lossless) for name, each in value.items()}

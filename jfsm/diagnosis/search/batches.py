@@ -156,12 +156,11 @@ def groups(tried: Sequence[Candidate], own: Begin | None, problem: Problem) -> l
         law = offsets, *(effect.cause.effect for effect in candidate.effects)
         together = by_law.setdefault((law, candidate if alone else None), [])
         together += [(candidate, start, begin) for begin in _begins(candidate, own) for start in candidate.starts]
-    return [
-        together[i : i + width]
-        for (_, alone), together in by_law.items()
-        for width in [len(together) if alone else LANES]
-        for i in range(0, len(together), width)
-    ]
+    found = list[list[Beginning]]()
+    for (_, alone), together in by_law.items():
+        width = len(together) if alone else LANES
+        found += [together[i : i + width] for i in range(0, len(together), width)]
+    return found
 
 
 def _begins(candidate: Candidate, own: Begin | None) -> list[Begin | None]:

@@ -1,6 +1,6 @@
 """One search in one problem: single effects, what is related to the best, and pairs where that leaves something."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -88,12 +88,12 @@ class Rounds:
         return self.problem.limit
 
     @cached_property
-    def _drives(self):
+    def _takes_the_drives_place(self) -> Callable[[Trial], bool]:
         return in_step(self.problem.records)
 
     def _apart_from_the_drive(self, trials: Sequence[Trial]) -> list[Trial]:
         """Those that do not take the place of the drive."""
-        return [t for t in trials if not self._drives(t)]
+        return [t for t in trials if not self._takes_the_drives_place(t)]
 
     def _likeliest(self, trials: Sequence[Trial]) -> Trial:
         return max(self._apart_from_the_drive(trials), key=lambda t: t.evidence)
