@@ -90,14 +90,14 @@ class Weighed:
         )
 
     def _cards(self) -> Iterator[Scorecard]:
-        every, model, records = self.found.every, self.problem.model, self.problem.records
-        why_not_identifiable, stands_for_the_drive = untold(records), in_step(records)
+        every, problem = self.found.every, self.problem
+        why_not_identifiable, stands_for_the_drive = untold(problem.records), in_step(problem.records)
         for t in every:
             if self.model_error:  # laws of time are none here, whatever the records show
-                yield scorecard(t, every, model)
+                yield scorecard(t, every, problem)
             else:
                 yield scorecard(
-                    t, every, model, in_step=stands_for_the_drive(t), not_identifiable=why_not_identifiable(t)
+                    t, every, problem, in_step=stands_for_the_drive(t), not_identifiable=why_not_identifiable(t)
                 )
 
     def _other_shapes(self, key: str) -> OtherShapes:

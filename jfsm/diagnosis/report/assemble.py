@@ -21,8 +21,9 @@ from ..evidence.setup import Problem
 from ..hypotheses.candidate import Candidate
 from ..search.batches import LeftBehind
 from ..verdict.decision import Decision
+from ..verdict.judge import evidence_behind
 from .estimates import Units, noise_by_channel, refitted_values, smallest_effects, unit_of
-from .findings import findings_of, fitted_candidate, unfitted_candidate
+from .findings import Ranked, findings_of, fitted_candidate, unfitted_candidate
 from .force_shape import shape_of
 from .plain_data import Drawn, jfsm_version, plain_gain, plain_record
 from .sentences import difference_sentence, verdict_advice, verdict_sentence
@@ -52,6 +53,11 @@ class Reached(NamedTuple):
     term: AbstractTerm | None
     evidence: Evidence
 
+    def ranked(self, trials: list[Trial]) -> Ranked:
+        """The decision with the hypotheses behind it."""
+        cards = evidence_behind(self.decision, self.evidence).cards
+        return Ranked(self.decision, {t.key: t for t in trials}, cards)
+
 
 def assemble(
     reached: Reached,
@@ -69,7 +75,7 @@ def assemble(
     decision, unfinished, model, records = reached.decision, tested.unfinished, problem.model, problem.records
     first, verdict = records[0], decision.verdict
     units, imposed = first.record.units, first.path is not None
-    findings = findings_of(decision, reached.winner, tested.trials, clipped, model, first)
+    findings = findings_of(reached.ranked(tested.trials), reached.winner, clipped, model, missing, first)
     candidates = tuple(_candidates(tested, decision, refitted, model, units))
     winner = reached.winner if decision.winner != GIVEN else refitted
     refit = refitted_values(winner, model, units)

@@ -13,8 +13,6 @@ from ..thresholds import THRESHOLDS
 from ..verdict.decision import Decision
 from .force_shape import Shape
 
-_SURE = 0.9
-"""Probability of a cause from which its name is not open."""
 _GO_ON = "Let the search go on to its end before the model is changed."
 _NO_GAIN = "Do not change the model for the sake of its predictions: on held-out readings it gains no more than chance."
 _ADVICE = {
@@ -78,14 +76,25 @@ def finding_sentence(finding: Finding, known: Mapping[str, Cause]) -> str:
     """A finding in words; where its law is open, its class comes first, and then the laws that it may be."""
     cause, where = known[finding.cause], "-".join(map(str, finding.at))
     lacks = "The record shows" if cause.is_sensor else "The model lacks"
-    others = [(known[r.cause].label, r.probability) for r in finding.rivals if r.cause in known]
-    if finding.probability < _SURE and finding.kind_probability - finding.probability > RIVAL:
-        listed = ", ".join(f"{name} ({chance:.0%})" for name, chance in [(cause.label, finding.probability), *others])
-        return f"{lacks} {finding.kind} at {where} ({finding.kind_probability:.0%}); its law is open: {listed}."
+    if finding.law_open and finding.kind_probability - finding.probability > RIVAL:
+        return f"{lacks} {finding.kind} at {where}{_how_much(finding)}; its law is open: {_laws(finding, known)}."
     named = f"{lacks} {cause.label} at {where}: {finding.sentence}."
-    if finding.probability >= 0.5 or not finding.rivals:
+    if finding.probability >= THRESHOLDS.named or not finding.rivals:
         return named
-    return f"{named} By this record it may as well be {' or '.join(dict(others))}."
+    others = (known[r.cause].label for r in finding.rivals if r.cause in known)
+    return f"{named} By this record it may as well be {' or '.join(dict.fromkeys(others))}."
+
+
+def _how_much(finding: Finding) -> str:
+    """How sure a class is, and its size with the interval, in words."""
+    size = finding.size
+    about = "" if size is None else f", about {size.value:.3g} {size.unit} [{size.low:.3g}, {size.high:.3g}]"
+    return f" ({finding.kind_probability:.0%}){about}"
+
+
+def _laws(finding: Finding, known: Mapping[str, Cause]) -> str:
+    """The laws of a class with their probabilities in words."""
+    return ", ".join(f"{known[name].label} ({share:.0%})" for name, share in finding.members.items() if name in known)
 
 
 def _named(decision: Decision, winner: Trial, findings: Sequence[Finding]) -> str:

@@ -169,12 +169,13 @@ CHECKS: Mapping[str, Kind] = {
         "It is more likely than everything else together.",
         ("named", "tempering", "fewest_looks", "most_looks", "periods_per_look", "unlisted"),
     ),
-    "probability_of_family": Kind(
+    "probability_of_class": Kind(
         "named",
         ">=",
         "probability",
-        "If it is not, the laws of its family together are likely.",
-        ("family",),
+        "If it is not, laws of a class that it belongs to are likely together: the narrowest such class is named, and "
+        "the law is open.",
+        ("class_named",),
     ),
     "same_in_all_records": Kind(
         "named",

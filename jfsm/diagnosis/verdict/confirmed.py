@@ -40,7 +40,8 @@ def confirm(decision: Decision, evidence: Evidence, limits: Thresholds, *, long_
         decision = decision.refused(against[1], REFITTED, against[0])
     elif hearing.closes_too_little():
         decision = decision.less_sure("runs over held-out readings close less than half")
-    by_class = None if decision.near is None or decision.verdict != "undecided" else _of_its_class(decision, hearing)
+    open_yet = decision.near is not None and decision.verdict in ("undecided", "unnamed")
+    by_class = _of_its_class(decision, hearing) if open_yet else None
     return replace(by_class or decision, checks=(*decision.checks, *hearing.bench.log))
 
 

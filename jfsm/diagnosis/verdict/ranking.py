@@ -10,6 +10,7 @@ from ..evidence.scorecard import Scorecard
 from ..thresholds import THRESHOLDS, Thresholds
 from .admissible import is_possible
 from .bench import Bench, shown
+from .claims import Claim, alike, claims_of, holds, words
 
 
 def rank(bench: Bench) -> Scorecard:
@@ -25,18 +26,21 @@ def rank(bench: Bench) -> Scorecard:
     if special is None:
         return winner
     bench.reasons |= {winner.key: "is hardly more probable than its special case", special.key: ""}
+    share = bench.probability(winner.key) / bench.probability(special.key)
+    bench.less_sure([special.key], "stands for the wider law, too", 1.0 + share)
+    bench.less_sure([winner.key], "its special case stands for it", 0.0)
     return special
 
 
-def family_of(winner: Scorecard, bench: Bench) -> list[Scorecard]:
-    """The alternatives whose effects are of the same families."""
-    return [card for card in bench.candidates if card.key in bench.factors and card.families == winner.families]
+def kin_of(winner: Scorecard, bench: Bench) -> list[Scorecard]:
+    """The alternatives whose effects are of the same classes as the winner's."""
+    return [card for card in bench.candidates if card.key in bench.factors and alike(card, winner)]
 
 
 def is_sure_of(winner: Scorecard, bench: Bench) -> bool:
-    """Whether a name, or at least its family, is probable enough to be said."""
+    """Whether a name, or at least a class of laws, is probable enough to be said."""
     _beside_likelier_laws(winner, bench)
-    family = sum(bench.probability(card.key) for card in family_of(winner, bench))
+    likely = {claim: _probability_of(claim, bench) for claim in claims_of(winner)}
     if not bench.noise_only(winner):
         # The rest may be the work of another law than the catalogue's: no name is surer than what it explains.
         bench.less_sure(list(bench.factors), "share of the excess that the leader explains", bench.explained(winner))
@@ -45,11 +49,17 @@ def is_sure_of(winner: Scorecard, bench: Bench) -> bool:
     named = bench.check("probability", winner.key, probability, limits.named, says)
     if named.passed:
         return True
-    says = f"laws of its family have a probability of {family:.0%}; {limits.family:.0%} are needed"
-    alike = bench.check("probability_of_family", winner.key, family, limits.family, says)
-    if not alike.passed:
-        bench.stop(named)
-    return bool(alike.passed)
+    for claim, chance in likely.items():
+        says = f"{words(claim)} has a probability of {chance:.0%}; {limits.class_named:.0%} are needed"
+        if bench.check("probability_of_class", winner.key, chance, limits.class_named, says).passed:
+            return True
+    bench.stop(named)
+    return False
+
+
+def _probability_of(claim: Claim, bench: Bench) -> float:
+    """Probability that something of these classes acts, with or without something else."""
+    return sum(bench.probability(card.key) for card in bench.candidates if holds(card, claim))
 
 
 def _beside_likelier_laws(winner: Scorecard, bench: Bench) -> None:
@@ -79,8 +89,9 @@ def _special_case(winner: Scorecard, passing: Sequence[Scorecard], bench: Bench)
     best = max(cases, key=lambda card: card.evidence, default=None)
     if best is None:
         return None
-    nats, least = winner.evidence - best.evidence, bench.limits.special_case
-    says = f"gains {shown(nats)} nats over its special case, {best.label}; at least {least:.3g} are needed"
+    nats = math.log(bench.probability(winner.key) / bench.probability(best.key))
+    least = bench.limits.special_case
+    says = f"is {shown(nats)} nats likelier than its special case, {best.label}; at least {least:.3g} are needed"
     seen = bench.check("no_simpler_law_as_good", winner.key, nats, least, says)
     return None if seen.passed else best
 
