@@ -913,3 +913,22 @@ def test_another_threshold_gives_another_verdict_and_every_number_is_explained()
     assert judge(evidence).verdict == "cause" and judge(evidence).probability(FRICTION) < 0.95
     assert judge(evidence, replace(THRESHOLDS, named=0.99, class_named=1.1)).verdict == "undecided"
     assert all(number.unit and number.means and number.source for number in THRESHOLDS.explained().values())
+
+
+@pytest.mark.parametrize(("numbers", "winner"), [(4, "cubic_damping@0-1+cubic_hardening@0-1"), (1, "bouc_wen@0-1")])
+def test_two_laws_need_not_pay_beside_one_that_has_as_many_numbers(numbers: int, winner: str):
+    one = card(9000.0, 0.0008, "bouc_wen", unknowns=4 + numbers)
+    two = card(8900.0, 0.0004, "cubic_damping", "cubic_hardening", unknowns=6)
+    singles = card(4000.0, 0.03, "cubic_damping", unknowns=5), card(5000.0, 0.02, "cubic_hardening", unknowns=5)
+    decision = judged(one, two, *singles)
+    assert outcome(decision) == f"cause {winner}"
+    assert ("alone" in decision.reasons[two.key]) is (winner == one.key)
+
+
+def test_noise_leaves_no_more_of_any_hypothesis_than_of_the_best():
+    errors, expected = np.array([0.04, 0.03]), np.array([0.01, 0.01])
+    found = Prediction(errors, expected, expected / 2)
+    least = np.array([0.001, 0.02])
+    capped = found.at_floor(least)
+    assert np.all(capped.expected == [0.001, 0.01]) and np.all(capped.scatter == [0.001, 0.005])
+    assert np.all(capped.excess == errors - capped.expected) and capped.left() > found.left()

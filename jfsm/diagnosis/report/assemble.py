@@ -81,7 +81,7 @@ def assemble(
     refit = refitted_values(winner, model, units)
     between = [] if verdict == "consistent" else differences(winner)
     differ = [difference_sentence(one, unit_of(winner.structure, one.path, units)) for one in between]
-    notes = tuple(dict.fromkeys(_notes(unfinished, problem, differ, winner)))
+    notes = tuple(dict.fromkeys(_notes(unfinished, problem, differ, winner, gain)))
     smallest = smallest_effects(tested.seen, units)
     shape = shape_of(missing) if verdict in ("undecided", "unnamed") else None
     drawn = Drawn(missing, runs, reached.term, first.record, first.period, with_shape=verdict != "consistent")
@@ -127,13 +127,15 @@ def _candidates(
         yield unfitted_candidate(candidate.effects, decision, candidate.share or 0.0)
 
 
-def _notes(unfinished: Unfinished, problem: Problem, differ: list[str], winner: Trial) -> Iterator[str]:
+def _notes(
+    unfinished: Unfinished, problem: Problem, differ: list[str], winner: Trial, gain: Gain | None
+) -> Iterator[str]:
     """What was not done, and what a reader has to know about the records and the runs."""
     first = problem.first
     yield from unfinished.notes
     for nuisances in problem.records:
         yield from nuisances.notes
-    yield from how_run(first)
+    yield from how_run(first, gain)
     yield from zeros(first)
     yield from memories(first)
     yield from differ

@@ -121,4 +121,5 @@ def _gained(gain: Gain | None, *, imposed: bool) -> str:
     if gain is None:
         return ""
     error = "error of the predicted force" if imposed else "free-run error"
-    return f" The {error} on held-out readings goes from {gain.before:.2%} to {gain.after:.2%} of the signal."
+    refitted = f" ({gain.refitted:.2%} refitted)" if gain.beyond_refit else ""
+    return f" The {error} on held-out readings goes from {gain.before:.2%}{refitted} to {gain.after:.2%} of the signal."

@@ -96,7 +96,7 @@ class _Hearing:
         return self.bench.check(name, self.decision.winner, measured, limit, says)
 
     def _not_worse(self) -> Objection:
-        if self.decision.verdict not in ("cause", "unnamed"):
+        if self.decision.verdict not in ("parameters", "cause", "unnamed"):
             return None
         most, errors = self.bench.limits.worse, self.errors
         times = errors.after / max(errors.before, errors.floor)
