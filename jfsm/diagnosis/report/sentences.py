@@ -41,10 +41,11 @@ def verdict_sentence(
     """The verdict in words, with the sentences on `differences` between records and the gain on held-out readings."""
     gained = _gained(gain, imposed=imposed)
     if decision.verdict == "consistent":
-        return "The record shows nothing beyond noise that the model lacks."
+        return "The record shows nothing beyond noise that the model lacks." + _trace(decision, winner)
     if decision.verdict == "parameters":
         what = "; ".join(f.sentence for f in findings) or "its own values moved together"
-        return " ".join([f"The form of the model is right, its values are off: {what}.", *differences]) + gained
+        words = f"The form of the model is right, its values are off: {what}.{_trace(decision, winner)}"
+        return " ".join([words, *differences]) + gained
     if decision.verdict == "cause":
         return " ".join([_named(decision, winner, findings), *differences]) + gained
     if decision.verdict == "unnamed":
@@ -114,6 +115,14 @@ def _remainder(winner: Trial) -> str:
     if left < THRESHOLDS.negligible:
         return ""
     return f" Something is left beyond {'them' if len(winner.effects) > 1 else 'it'}: {left:.1%} of the signal."
+
+
+def _trace(decision: Decision, winner: Trial) -> str:
+    """What is left where it is no cause; empty where nothing is."""
+    if all(row.passed for row in decision.checks if row.name == "more_than_a_trace"):
+        return ""
+    left = winner.prediction.left()
+    return f" A trace is left, {left:.1%} of the signal, which laws of several classes explain alike: it is no cause."
 
 
 def _gained(gain: Gain | None, *, imposed: bool) -> str:

@@ -177,6 +177,14 @@ CHECKS: Mapping[str, Kind] = {
         "the law is open.",
         ("class_named",),
     ),
+    "more_than_a_trace": Kind(
+        "named",
+        "<",
+        "share of its gain",
+        "Where the refitted model leaves nothing, laws of other classes do not gain nearly all that it gains: what "
+        "unlike laws explain alike is a little that the noise's model lacks.",
+        ("nearly_all",),
+    ),
     "same_in_all_records": Kind(
         "named",
         "<=",
@@ -237,17 +245,12 @@ CHECKS: Mapping[str, Kind] = {
         "Its held-out run is no worse than that of the model as given.",
         ("worse",),
     ),
-    "not_harmful": Kind(
-        "confirmed",
-        ">=",
-        "share of held-out error",
-        "If it leaves more than noise, its held-out run adds no error beyond chance.",
-    ),
     "gains_something": Kind(
         "confirmed",
         ">",
         "share of held-out error",
-        "If it is not likely, or predictions do not show it, its held-out run is better beyond chance.",
+        "If it leaves more than noise, its held-out run may close some of the error (the upper end of the interval); "
+        "if it is not likely, or predictions do not show it, it does so for certain (the lower end).",
         ("named", "beyond_question"),
     ),
     "closes_half": Kind(

@@ -31,6 +31,12 @@ def alike(card: Scorecard, winner: Scorecard) -> bool:
     )
 
 
+def shares_a_class(card: Scorecard, winner: Scorecard) -> bool:
+    """Whether any effects of two alternatives are of one class."""
+    classes = {name for effect in winner.effects for name in effect.classes}
+    return any(not classes.isdisjoint(effect.classes) for effect in card.effects)
+
+
 def words(claim: Claim) -> str:
     """A claim in words."""
     return " and ".join(f"{name} at {'-'.join(map(str, at))}" for at, name in claim)

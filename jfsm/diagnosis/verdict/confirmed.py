@@ -110,7 +110,7 @@ class _Hearing:
             return None
         high = self.errors.interval[1]
         says = f"closes {high:.0%} of the error on held-out readings at most; it must not add to it"
-        return self._refused(self._check("not_harmful", high, 0.0, says))
+        return self._refused(self._check("gains_something", high, 0.0, says))
 
     def _refused(self, row: Check) -> Objection:
         return None if row.passed else (row, "runs worse on held-out readings than the model as given")

@@ -6,19 +6,24 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..evidence import excess
-from ..evidence.scorecard import Scorecard
+from ..evidence.scorecard import CONSTANT_FORCE, Scorecard
 from ..thresholds import THRESHOLDS, Thresholds
 from .admissible import is_possible
 from .bench import Bench, shown
-from .claims import Claim, alike, claims_of, holds, words
+from .claims import Claim, alike, claims_of, holds, shares_a_class, words
+
+TRACE = "is a trace: laws of other classes gain about as much, where the refitted model leaves nothing"
 
 
 def rank(bench: Bench) -> Scorecard:
     """The most probable alternative; of a law and its special case that are about as probable, the latter."""
+    winner = _most_probable(bench)
+    if _is_a_trace(winner, bench):
+        for card in bench.passing:
+            if card.laws:
+                bench.reasons[card.key] = TRACE
+        winner = _most_probable(bench)
     passing = bench.passing
-    alternatives = [bench.given, bench.refitted, *passing]
-    _share_out(alternatives, bench)
-    winner = max(alternatives, key=lambda card: bench.probability(card.key))
     for card in passing:
         if card is not winner:
             bench.reasons[card.key] = "explains it too, but is less probable"
@@ -30,6 +35,31 @@ def rank(bench: Bench) -> Scorecard:
     bench.less_sure([special.key], "stands for the wider law, too", 1.0 + share)
     bench.less_sure([winner.key], "its special case stands for it", 0.0)
     return special
+
+
+def _most_probable(bench: Bench) -> Scorecard:
+    alternatives = [bench.given, bench.refitted, *bench.passing]
+    _share_out(alternatives, bench)
+    return max(alternatives, key=lambda card: bench.probability(card.key))
+
+
+def _is_a_trace(winner: Scorecard, bench: Bench) -> bool:
+    """Whether laws of other classes gain nearly all that the winner gains over a refit that leaves nothing.
+
+    What so many unlike laws explain is a little that the noise's model lacks, and no cause.
+    """
+    if all(law.role == CONSTANT_FORCE for law in winner.laws) or not bench.noise_only(bench.refitted):
+        return False
+    known = max(bench.given.evidence, bench.refitted.evidence)
+    likeliest = max((card.evidence for card in _single_laws(bench) if not shares_a_class(card, winner)), default=known)
+    share = (likeliest - known) / (winner.evidence - known)
+    says = f"laws of other classes gain {share:.0%} of what it gains, where the refitted model leaves nothing"
+    return not bench.check("more_than_a_trace", winner.key, share, bench.limits.nearly_all, says).passed
+
+
+def _single_laws(bench: Bench) -> list[Scorecard]:
+    """Alternatives of one law that is possible, and takes no drive's place."""
+    return [c for c in bench.apart_from_the_drive if len(c.effects) == 1 and c.laws and is_possible(c, bench)]
 
 
 def kin_of(winner: Scorecard, bench: Bench) -> list[Scorecard]:
