@@ -12,6 +12,7 @@ from ...structures import Clipping, Structure
 from ..hypotheses.effect import key_of
 from ..search.batches import LeftBehind
 from ..search.rounds import Searched
+from ..thresholds import THRESHOLDS
 from ..verdict.decision import Decision
 from .evidence import Evidence, Measure, SetAside, Setting, has_map, map_on
 from .fitted import Trial
@@ -22,7 +23,7 @@ from .missing_force import stand_in
 from .model_error import forgiving
 from .noise_draws import noise_levels
 from .prediction import Prediction
-from .scorecard import GIVEN, OtherShapes, Scorecard, scorecard
+from .scorecard import GIVEN, REFITTED, OtherShapes, Scorecard, scorecard
 from .setup import Problem
 from .split import HeldOut
 
@@ -67,14 +68,26 @@ class Weighed:
         return self.maps[key] if has_map(key) else self._trials[key]
 
     def gain(self, decision: Decision) -> tuple[Gain | None, list[dict]]:
-        """Gain of what was decided over the model as stated, and the runs behind it; none where nothing is held out."""
-        key = GIVEN if decision.verdict == "consistent" else decision.winner
+        """Gain of what is handed out over the model as stated, and the runs behind it; none where nothing is held out."""
+        key = self._handed_out(decision)
         self._held_out(key)
         return self.runs.get(key, (None, []))
 
     def extended(self, decision: Decision) -> Structure:
         """The structure to go on with."""
-        return self.held_out.model if decision.verdict == "consistent" else self.trial(decision.winner).extended()
+        key = self._handed_out(decision)
+        return self.held_out.model if key == GIVEN else self.trial(key).extended()
+
+    def _handed_out(self, decision: Decision) -> str:
+        """Key of the hypothesis to go on with: never one that runs worse over held-out readings than as given."""
+        undecided = decision.verdict == "undecided" and self._refit_is_no_better()
+        return GIVEN if decision.verdict == "consistent" or undecided else decision.winner
+
+    def _refit_is_no_better(self) -> bool:
+        """Whether own values refitted are hardly likelier than as given, or run worse over held-out readings."""
+        gained, errors = self.found.refitted.evidence - self.found.given.evidence, self._held_out(REFITTED)
+        worse = errors is not None and errors.after > errors.before
+        return gained < THRESHOLDS.significant or worse
 
     @cached_property
     def _trials(self) -> dict[str, Trial]:

@@ -11,6 +11,8 @@ from .fitted import Trial, ended, own_values
 
 _HARDLY_TRUSTED = math.log(2.0)
 """Width of an own value's prior from which it may be nothing: its owner trusts it to the whole of itself."""
+_TAKE_ENERGY = ("damping", "memory")
+"""Families of effects that may take energy."""
 _NEAR = 0.01
 """Distance to a bound, as a share of it, from which a value is there."""
 
@@ -18,11 +20,12 @@ _NEAR = 0.01
 def at_bounds(trial: Trial) -> set[str]:
     """Own values that went as far as they may: they make up for a force that another structure has.
 
-    So it is with the size of a sensor's fault. Damping may go: a model without friction often states as viscous what
-    friction takes. And so may what its owner hardly trusts.
+    So it is with the size of a sensor's fault. Damping may go where an effect takes energy in its place: a model
+    without friction often states as viscous what friction takes. And so may what its owner hardly trusts.
     """
     values = _may_make_up(trial)
-    low = [u for u, theta in values if theta < u.low + _NEAR and not u.path.startswith("damping@")]
+    taken = any(effect.cause.family in _TAKE_ENERGY for effect in trial.effects)
+    low = [u for u, theta in values if theta < u.low + _NEAR and not (taken and u.path.startswith("damping@"))]
     high = {u.path for u, theta in values if theta > u.high - _NEAR}
     return high | {u.path for u in low if u.width < _HARDLY_TRUSTED}
 

@@ -13,6 +13,8 @@ from ...structures import (
     Clipping,
     CoulombAsymmetric,
     ForceGain,
+    LinearDamping,
+    LinearStiffness,
     Preload,
     Structure,
     causes,
@@ -78,7 +80,18 @@ def _links(cause: Cause, model: Structure, places: Sequence[tuple] | None) -> li
     masses = [(0, j) for j in range(1, model.dof + 1)]
     if cause.effect.hangs:
         return [at for at in masses if places is None or at in places]
+    if cause.effect in (LinearStiffness, LinearDamping):
+        return [at for at in _without(cause.effect, model) if places is None or at in places]
     return list(places if places is not None else masses if cause.family == "input" else model.links)
+
+
+def _without(kind: type, model: Structure) -> list[tuple[int, int]]:
+    """Masses and their neighbours, and theirs, and the ground, that no linear spring, or dashpot, ties."""
+    tied = {frozenset(t.at) for t in model.terms if isinstance(t, kind)}
+    near = {frozenset(link) for link in model.links}
+    further = {one ^ other for one in near for other in near if len(one & other) == 1}
+    ground = {frozenset((0, j)) for j in range(1, model.dof + 1)}
+    return sorted((min(pair), max(pair)) for pair in (near | further | ground) - tied)
 
 
 def _channels(cause: Cause, model: Structure, records: Sequence[Nuisances]) -> list[tuple[str, int]]:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from ...plant import force_at
-from ...structures import AbstractSensor, AbstractTerm, BoucWen, Cause
+from ...structures import AbstractSensor, AbstractTerm, BoucWen, Cause, LinearDamping, LinearStiffness
 from .curves import bent, growth
 
 _POINTS = 41
@@ -25,6 +25,7 @@ TWO_SIDED = "a spring that differs between its two sides"
 FASTER = "damping that grows faster than speed"
 TWO_WAYS = "damping that differs between the two directions"
 AMPLITUDE = "damping that grows with amplitude"
+LINK = "a link that the model lacks"
 SPRING = "a nonlinear spring"
 DAMPING = "nonlinear damping"
 MEMORY = "a force with memory"
@@ -35,8 +36,8 @@ DELAY = "a delay between sensors"
 SENSOR = "a fault of a sensor"
 
 NARROWEST_FIRST = (
-    PLAY, FRICTION, HYSTERESIS, HARDENING, SOFTENING, TWO_SIDED, FASTER, TWO_WAYS, AMPLITUDE, CHANGING_STIFFNESS, DELAY,
-    SPRING, DAMPING, MEMORY, CHANGE, LOAD, SENSOR,
+    LINK, PLAY, FRICTION, HYSTERESIS, HARDENING, SOFTENING, TWO_SIDED, FASTER, TWO_WAYS, AMPLITUDE, CHANGING_STIFFNESS,
+    DELAY, SPRING, DAMPING, MEMORY, CHANGE, LOAD, SENSOR,
 )  # fmt: skip
 """Every class, by how much it says."""
 
@@ -68,6 +69,8 @@ _BY_ASYMMETRY = {"displacement": (TWO_SIDED,), "velocity": (TWO_WAYS,)}
 
 def classes_of(cause: Cause, part: AbstractTerm | AbstractSensor, peak: float, speed: float) -> tuple[str, ...]:
     """The classes of a law or a sensor's fault, the narrowest first, for motions up to `peak` and `speed`."""
+    if cause.effect in (LinearStiffness, LinearDamping):
+        return (LINK,)
     found = {_WIDEST[cause.family], *_BY_LAW.get(cause.id, ())}
     if cause.family in ("stiffness", "damping") and isinstance(part, AbstractTerm):
         found.update(_by_curve(part, peak, speed))
