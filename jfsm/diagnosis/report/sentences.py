@@ -50,11 +50,12 @@ def verdict_sentence(
         return " ".join([_named(decision, winner, findings), *differences]) + gained
     if decision.verdict == "unnamed":
         looks = "" if shape is None else f" {shape.words}"
-        return f"A real effect is there that no catalogue entry explains; a map stands in.{looks}{gained}"
+        return f"A real effect is there that no law of the catalogue explains; a map stands in.{looks}{gained}"
     if not decision.finished:
         return "The search was ended before it was finished, and nothing that was tried until then is found."
     stopped = stopping_line(decision.plain)
-    return f"Something is wrong beyond noise, and this record cannot tell what. {stopped}".strip()
+    looks = "" if shape is None else f" Of the missing force: {shape.words[0].lower()}{shape.words[1:]}"
+    return f"Something is wrong beyond noise, and this record cannot tell what. {stopped}{looks}".strip()
 
 
 def verdict_advice(decision: Decision, gain: Gain | None, *, imposed: bool) -> str:
