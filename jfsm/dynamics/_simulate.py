@@ -8,11 +8,12 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 
 from .._programs import programs_kept
 from .._result import Result
-from .._types import as_numbers, is_traced, known, require_x64
+from .._types import HostArray, as_numbers, is_traced, known, require_x64
 from ..records import Record
 from ..structures import (
     AbstractFriction,
@@ -87,16 +88,16 @@ class Response:
         throughout; else the motion is sensitive, chaotic perhaps, and what follows is one of many motions.
     """
 
-    time: np.ndarray
-    displacement: np.ndarray
-    velocity: np.ndarray
-    acceleration: np.ndarray
+    time: Float[HostArray, " n"]
+    displacement: Float[HostArray, "n dof"]
+    velocity: Float[HostArray, "n dof"]
+    acceleration: Float[HostArray, "n dof"]
     result: Result
     escape_time: float | None
     solver: str
     _sensors: tuple[AbstractSensor, ...]
-    force: np.ndarray | None = None
-    error: np.ndarray | None = None
+    force: Float[HostArray, "n dof"] | None = None
+    error: Float[HostArray, " dof"] | None = None
     agreed_until: float | None = None
 
     @property
@@ -113,7 +114,7 @@ class Response:
             "Compare statistics there, or run shorter stretches from measured states."
         )
 
-    def readings(self, record: Record) -> dict[tuple[str, int], np.ndarray]:
+    def readings(self, record: Record) -> dict[tuple[str, int], Float[np.ndarray, " n"]]:
         """What the sensors of `record` would show, by channel (kind, degree of freedom): their effects applied.
 
         It is the channels of the response; where the motion is imposed, those of the force.
@@ -466,7 +467,7 @@ def finer(substeps: int) -> int:
     return max(min(_FINER * substeps, _MOST_FINER), 2 * substeps)
 
 
-def motion_bound(plant: Plant, fine: Fine, record: Record, x0: np.ndarray, x: np.ndarray) -> np.ndarray:
+def motion_bound(plant: Plant, fine: Fine, record: Record, x0: np.ndarray, x: np.ndarray) -> np.ndarray | np.float64:
     """Displacement beyond which a run has escaped: far more than was measured, could be driven, or is usual in it.
 
     The plant's matrices, `x0` (..., dof) and `x` (..., n, dof) may have leading axes, one bound for each.
@@ -483,8 +484,8 @@ def motion_bound(plant: Plant, fine: Fine, record: Record, x0: np.ndarray, x: np
     return _BOUND * np.maximum(np.max(np.stack(np.broadcast_arrays(*sizes)), axis=0), max(measured, 1e-300))
 
 
-def escapes(bound: np.ndarray, x: np.ndarray, v: np.ndarray) -> np.ndarray:
+def escapes(bound: np.ndarray | np.float64, x: np.ndarray, v: np.ndarray) -> np.ndarray:
     """First sample of each run (..., n, dof) beyond its bound; n where there is none."""
-    good = np.isfinite(x) & np.isfinite(v) & (np.abs(x) < bound[..., None, None])
+    good = np.isfinite(x) & np.isfinite(v) & (np.abs(x) < np.asarray(bound)[..., None, None])
     bad = ~np.all(good, axis=-1)
     return np.where(np.any(bad, axis=-1), np.argmax(bad, axis=-1), x.shape[-2])

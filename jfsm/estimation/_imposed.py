@@ -7,8 +7,9 @@ it, so that the innovations are white where the structure is right.
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from .._types import Array
 from ..dynamics._imposed import Imposed
 from ..dynamics._needed import needed
 from ..dynamics._plant import Plant, Readout

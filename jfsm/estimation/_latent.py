@@ -15,9 +15,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
-from jaxtyping import Array, Float
+from jaxtyping import ArrayLike, Bool, Float, Shaped
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
+from .._types import Array
 from ..dynamics._along import force_along
 from ..dynamics._excitation import bucket
 from ..dynamics._grid import Fine, punctual, shifted
@@ -49,11 +50,11 @@ class Latent:
         Whether anything moved within half a period, beyond the error of its velocity.
     """
 
-    displacement: np.ndarray
-    velocity: np.ndarray
-    force: np.ndarray
-    std: np.ndarray
-    moves: np.ndarray
+    displacement: Float[np.ndarray, "n dof"]
+    velocity: Float[np.ndarray, "n dof"]
+    force: Float[np.ndarray, "n dof"]
+    std: Float[np.ndarray, "n dof"]
+    moves: Bool[np.ndarray, " n"]
 
 
 class _Model(NamedTuple):
@@ -65,7 +66,15 @@ class _Model(NamedTuple):
 
 
 def latent_force(
-    plant: Plant, show: Readout, fine: Fine, values, use, variance, force_covariance, omega: float, length: float
+    plant: Plant,
+    show: Readout,
+    fine: Fine,
+    values: Float[ArrayLike, "n channels"],
+    use: Shaped[ArrayLike, "n channels"],
+    variance: Float[ArrayLike, " channels"],
+    force_covariance: Float[ArrayLike, "dof dof"],
+    omega: float,
+    length: float,
 ) -> Latent:
     """Smoothed motion and missing force.
 
@@ -81,7 +90,7 @@ def latent_force(
     omega, length : float
         Angular frequency [rad/s] and size of the motion.
     """
-    n, dt = len(values), float(fine.step)
+    n, dt = np.shape(values)[0], float(fine.step)
     padded = min(bucket(n), fine.time.shape[0])  # nothing is read where it is filled up
     values, use = (np.pad(np.asarray(q), ((0, padded - n), (0, 0))) for q in (values, use))
     base = np.asarray(fine.base)[:padded]

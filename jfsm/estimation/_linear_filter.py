@@ -13,8 +13,9 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Bool, Float, Int
 
+from .._types import Array
 from ..dynamics._plant import Plant, Readout
 from ..dynamics._stepper import inverse_mass, times
 from ._filter import Assumed, Known, beside, short_transition, transition, zeros_of

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Array, ArrayLike, Bool, Float
+from jaxtyping import Array, ArrayLike, Bool, Float, PRNGKeyArray
 from numpy.typing import NDArray
 
 from ..._types import as_array, is_traced, require_x64
@@ -342,7 +342,9 @@ class Kriging(AbstractForceStateMap):
         residual, std = self._joined([one[0] for one in found]), self._joined_std([one[1] for one in found])
         return LeaveOneOut(np.asarray(residual), np.asarray(std))
 
-    def sample(self, states: Float[ArrayLike, "q dim"], count: int, key: Array) -> Float[Array, "count q *outputs"]:
+    def sample(
+        self, states: Float[ArrayLike, "q dim"], count: int, key: PRNGKeyArray
+    ) -> Float[Array, "count q *outputs"]:
         """Force at the states in `count` maps that are as plausible as this one."""
         where = jnp.asarray(self._states(states))
         keys = jax.random.split(key, len(self.parts))
