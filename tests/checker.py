@@ -1,11 +1,12 @@
-"""How calls of jfsm are held to their annotations while the tests run."""
+"""How calls of jfsm are held to the shapes in their annotations while the tests run."""
 
+import inspect
 from collections.abc import Callable
-from io import IOBase
-from typing import Any, BinaryIO, Literal, Self
+from typing import Any, get_args, get_origin
 
 import numpy as np
 from beartype import BeartypeConf, FrozenDict, beartype
+from jaxtyping import AbstractArray
 
 CHECKED = (
     "jfsm.surrogates",
@@ -26,23 +27,24 @@ CHECKED = (
 )
 """Rooms, and the modules of `dynamics` with its public functions, whose calls are checked."""
 
-AS_ANNOTATED = BeartypeConf(
-    hint_overrides=FrozenDict(
-        {
-            int: int | np.integer,
-            float: float | int | np.floating | np.integer,
-            bool: bool | np.bool_,
-            Literal["band-limited", "linear", "hold"]: str,  # and with words of its own the library refuses others
-            Literal["reference", "grid"]: str,
-            Literal["separate", "shared", "coregionalised"]: str,
-            BinaryIO: IOBase,  # beartype asks for a name and a mode, which io.BytesIO has not
-            Self: Any,  # each method is decorated by itself, where its class is not known
-        }
-    )
+_NUMBERS = BeartypeConf(
+    hint_overrides=FrozenDict({int: int | np.integer, float: float | int | np.floating | np.integer})
 )
-"""Strict, but numbers of NumPy pass for those of Python, and an int for a float."""
+"""Beside shapes, numbers of NumPy pass for those of Python, and an int for a float."""
+
+
+def has_shape(hint: Any) -> bool:
+    """Whether an annotation tells the shape of an array; those of a function that is passed show in no call of ours."""
+    if get_origin(hint) is Callable:
+        return False
+    return inspect.isclass(hint) and issubclass(hint, AbstractArray) or any(map(has_shape, get_args(hint)))
 
 
 def checked(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function, whose arguments and result must be what their annotations say."""
-    return beartype(conf=AS_ANNOTATED)(function)
+    """The function, whose arrays must have the shapes that their annotations tell.
+
+    Of other annotations the type checker takes care, and of other arguments the library, with words of its own.
+    """
+    hints = function.__annotations__
+    function.__annotations__ = {name: hint if has_shape(hint) else Any for name, hint in hints.items()}
+    return beartype(conf=_NUMBERS)(function)

@@ -1,14 +1,14 @@
 """Shapes in annotations: calls are held to them while the tests run, and what the rooms offer has them."""
 
 import inspect
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import ModuleType
 from typing import Any, get_args, get_origin
 
 import jax
 import numpy as np
 import pytest
-from jaxtyping import AbstractArray, TypeCheckError
+from jaxtyping import AbstractArray, ArrayLike, TypeCheckError
 
 from jfsm import dynamics, estimation, identification, surrogates
 from jfsm._result import Result
@@ -32,8 +32,10 @@ def functions(thing: Any) -> Iterator[tuple[str, Any]]:
 
 
 def without_shape(hint: Any) -> bool:
-    """Whether an array stands in an annotation by itself."""
-    if inspect.isclass(hint) and issubclass(hint, AbstractArray):
+    """Whether an array stands in an annotation by itself; not so in what takes anything and says what is wrong."""
+    if inspect.isclass(hint) and issubclass(hint, AbstractArray) or get_origin(hint) is Callable:
+        return False
+    if set(get_args(ArrayLike)) <= set(get_args(hint)):
         return False
     return hint in (np.ndarray, jax.Array) or get_origin(hint) is np.ndarray or any(map(without_shape, get_args(hint)))
 

@@ -467,7 +467,7 @@ def finer(substeps: int) -> int:
     return max(min(_FINER * substeps, _MOST_FINER), 2 * substeps)
 
 
-def motion_bound(plant: Plant, fine: Fine, record: Record, x0: np.ndarray, x: np.ndarray) -> np.ndarray | np.float64:
+def motion_bound(plant: Plant, fine: Fine, record: Record, x0: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Displacement beyond which a run has escaped: far more than was measured, could be driven, or is usual in it.
 
     The plant's matrices, `x0` (..., dof) and `x` (..., n, dof) may have leading axes, one bound for each.
@@ -484,8 +484,8 @@ def motion_bound(plant: Plant, fine: Fine, record: Record, x0: np.ndarray, x: np
     return _BOUND * np.maximum(np.max(np.stack(np.broadcast_arrays(*sizes)), axis=0), max(measured, 1e-300))
 
 
-def escapes(bound: np.ndarray | np.float64, x: np.ndarray, v: np.ndarray) -> np.ndarray:
+def escapes(bound: np.ndarray, x: np.ndarray, v: np.ndarray) -> np.ndarray:
     """First sample of each run (..., n, dof) beyond its bound; n where there is none."""
-    good = np.isfinite(x) & np.isfinite(v) & (np.abs(x) < np.asarray(bound)[..., None, None])
+    good = np.isfinite(x) & np.isfinite(v) & (np.abs(x) < bound[..., None, None])
     bad = ~np.all(good, axis=-1)
     return np.where(np.any(bad, axis=-1), np.argmax(bad, axis=-1), x.shape[-2])
