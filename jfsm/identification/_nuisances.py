@@ -82,7 +82,7 @@ class Nuisances:
         What is imposed: the force (and the base), or the motion.
     spread : (channels,) array
         Standard deviation of each channel's readings.
-    force_floor : (dof,) array
+    force_floor : (dof,) array, empty where the motion is imposed
         Standard deviation of the white noise of the force's samples.
     base_floor : float
         That of the acceleration of the base.
@@ -117,7 +117,7 @@ class Nuisances:
     readings: Readings
     noise: ProcessNoise
     driving: DrivingNoise
-    force_floor: Float[np.ndarray, " dof"]
+    force_floor: Float[np.ndarray, " forces"]
     base_floor: float
     force_covariance: Float[np.ndarray, "dof dof"]
     spread: Float[np.ndarray, " channels"]
