@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
     HostArray = np.ndarray
 else:
-    Array = HostArray = jax.Array | np.ndarray
-    """Arrays of JAX, for which those of NumPy pass, as they do for JAX; and of NumPy, of JAX where they are traced."""
+    Array = HostArray = jax.Array | np.ndarray | np.generic
+    """Arrays of JAX, for which arrays and numbers of NumPy pass, as they do for JAX; and of NumPy, traced or not."""
 
 X64_MESSAGE = 'float64 data would be narrowed to float32; run `jax.config.update("jax_enable_x64", True)` first.'
 
