@@ -45,6 +45,8 @@ def checked(function: Callable[..., Any]) -> Callable[..., Any]:
 
     Of other annotations the type checker takes care, and of other arguments the library, with words of its own.
     """
-    hints = function.__annotations__
-    function.__annotations__ = {name: hint if has_shape(hint) else Any for name, hint in hints.items()}
+    hints = {name: hint for name, hint in function.__annotations__.items() if has_shape(hint)}
+    if not hints:
+        return function
+    function.__annotations__ = hints
     return beartype(conf=_NUMBERS)(function)
