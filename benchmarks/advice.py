@@ -28,7 +28,7 @@ import jfsm  # noqa: E402  (after double precision is on)
 from benchmarks.blind import diagnosed  # noqa: E402
 from benchmarks.blind_table import Share  # noqa: E402
 from benchmarks.rows import Row, keep, kept  # noqa: E402
-from jfsm.diagnosis._next import Proposal, separation  # noqa: E402
+from jfsm.diagnosis.advice.next_test import Proposal, separation  # noqa: E402
 from tests.blind import Challenge, draw, soiled  # noqa: E402
 from tests.blind.arrays import rms  # noqa: E402
 from tests.blind.challenge import true_channels, trusted_motion  # noqa: E402

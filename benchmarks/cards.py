@@ -9,6 +9,7 @@ and what was hidden, where that is known.
 import argparse
 import contextlib
 import json
+import os
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -72,7 +73,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder of the cards")
     parser.add_argument("--rigs", nargs="*", default=[], choices=["all", *rig_verdicts.RIGS], metavar="RIG")
     parser.add_argument("--cases", nargs="+", default=[], metavar=("FILE", "NAME"), help="a file of cases, and which")
-    parser.add_argument("--data", type=Path, help="folder of measured records")
+    default = Path(os.environ.get("JFSM_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
+    parser.add_argument("--data", type=Path, default=default, help="folder of measured records")
     given = parser.parse_args()
 
     def record(name: str, records: Any, model: Any, holdout: Any, truth: Mapping[str, Any]) -> None:

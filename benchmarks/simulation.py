@@ -41,10 +41,8 @@ jax.config.update("jax_enable_x64", True)
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import jfsm  # noqa: E402  (after double precision is on)
-from jfsm.dynamics import _simulate, lower  # noqa: E402
-from jfsm.dynamics._excitation import bucket  # noqa: E402
-from jfsm.dynamics._grid import Fine, run_grid  # noqa: E402
-from jfsm.dynamics._plant import Grid  # noqa: E402
+from jfsm.dynamics import _simulate  # noqa: E402
+from jfsm.plant import Grid, InterpolatedInput, bucket, lower, run_grid  # noqa: E402
 from tests.blind.arrays import FloatArray, rms  # noqa: E402
 from tests.blind.drives import Drive, Silence, SumOfSines  # noqa: E402
 from tests.blind.exact import RELATIVE_TOLERANCE, integrate  # noqa: E402
@@ -206,14 +204,16 @@ def relative(found: FloatArray, truth: FloatArray) -> float:
     return float(np.max(np.abs(found - truth))) / rms(truth) if found.shape == truth.shape else math.inf
 
 
-def known_force(drive: Drive, record: jfsm.Record, dof: int, substeps: int, *_: Any, length: int, **__: Any) -> Fine:
+def known_force(
+    drive: Drive, record: jfsm.Record, dof: int, substeps: int, *_: Any, length: int, **__: Any
+) -> InterpolatedInput:
     """In place of the library's `excitation`: the drive itself on half steps."""
     n, halves = len(record), 2 * substeps + 1
     inner = record.time[:, None] + record.dt / (2 * substeps) * np.arange(halves)
     force = np.zeros((length, halves, dof))
     force[:n, :, 0] = drive(np.minimum(inner, record.time[-1]))
     clock = record.time[0] + record.dt * np.arange(length)
-    return Fine(*(jnp.asarray(q) for q in (force, np.zeros((length, halves)), clock, record.dt)))
+    return InterpolatedInput(*(jnp.asarray(q) for q in (force, np.zeros((length, halves)), clock, record.dt)))
 
 
 def best_of(repeats: int, call: Callable[[], Any]) -> tuple[Any, float]:
@@ -239,8 +239,8 @@ def accuracy(name: str) -> dict[str, Any]:
     x0, v0 = (jnp.asarray([value]) for value in q.start)
     grid = []
     for substeps in STEPS:
-        fine = known_drive(record, 1, substeps, length=bucket(len(record)))
-        x = run_grid(lower(q.model, grid=Grid(record.dt, substeps)), fine, x0, v0)[0]
+        inputs = known_drive(record, 1, substeps, length=bucket(len(record)))
+        x = run_grid(lower(q.model, grid=Grid(record.dt, substeps)), inputs, x0, v0)[0]
         grid.append(relative(np.asarray(x)[: len(record), 0], q.truth))
     smooth = name not in NOT_SMOOTH
     return {

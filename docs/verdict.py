@@ -60,7 +60,8 @@ TAIL = """## To change something
   `right_shape.py`, `confirmed.py` (held-out readings) or `judge.py`, all beside it.
 - *What is measured*: `jfsm/diagnosis/evidence/`.
 - Then `python benchmarks/replay.py DIR` judges recorded cases anew in seconds and lists the verdicts that change;
-  `--sensitivity` moves every threshold by a fifth. `benchmarks/blind.py --cards DIR` and `benchmarks/cards.py` record.
+  `--sensitivity` moves every threshold by a fifth, `--checks` leaves out each check. `benchmarks/blind.py --cards DIR`
+  and `benchmarks/cards.py` record.
 """
 
 

@@ -9,6 +9,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from jfsm import _map_reader
+
 _ROOMS = {
     name.asname or name.name: line.module
     for line in ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")).body
@@ -32,3 +34,12 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
+
+
+def _read_map(path: Path) -> Any:
+    from jfsm.surrogates import load_map  # with JAX, which waits until there is a map to read
+
+    return load_map(path)
+
+
+_map_reader.set_map_reader(_read_map)

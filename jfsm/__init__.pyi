@@ -3,9 +3,7 @@
 from . import paper as paper
 from . import systems as systems
 from .diagnosis import Diagnosis as Diagnosis
-from .diagnosis import MappedForce as MappedForce
 from .diagnosis import diagnose as diagnose
-from .diagnosis import map_force as map_force
 from .dynamics import Backbone as Backbone
 from .dynamics import FixedPoint as FixedPoint
 from .dynamics import ForcedResponse as ForcedResponse
@@ -27,6 +25,8 @@ from .estimation import estimate_motion as estimate_motion
 from .estimation import restoring_force as restoring_force
 from .identification import Fit as Fit
 from .identification import fit as fit
+from .mapping import MappedForce as MappedForce
+from .mapping import map_force as map_force
 from .records import Record as Record
 from .records import align as align
 from .records import join as join

@@ -1,10 +1,11 @@
-"""Outcomes of a calculation: every member is a message a person can act on."""
+"""Outcomes of a calculation: how it ended, and values with their intervals."""
 
 import enum
+from dataclasses import dataclass
 
 
 class Result(enum.Enum):
-    """How a calculation ended; the value is the message."""
+    """How a calculation ended; the value is a message a person can act on."""
 
     successful = "converged"
     maximum_steps = "stopped at the largest number of iterations before it converged; the values may still move"
@@ -16,3 +17,13 @@ class Result(enum.Enum):
     def ok(self) -> bool:
         """Whether the answer can be used without reserve."""
         return self is Result.successful
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value with its 95 % interval and unit."""
+
+    value: float
+    low: float
+    high: float
+    unit: str

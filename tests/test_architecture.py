@@ -18,19 +18,33 @@ ROOMS = (
     "_limit",
     "_threads",
     "_programs",
+    "_map_reader",
     "reporting",
     "records",
     "structures",
     "surrogates",
+    "plant",
     "dynamics",
     "estimation",
     "identification",
+    "mapping",
     "diagnosis",
     "systems",
     "demo",
     "paper",
     "cli",
 )
+
+# Rooms whose public face is all that other rooms may use.
+CLOSED = ("plant", "dynamics")
+
+# Rooms whose files and functions stay small.
+SMALL_ROOMS = ("diagnosis", "mapping")
+MOST_LINES, MOST_COMPLEXITY = 350, 10
+BRANCHES = (ast.If, ast.IfExp, ast.For, ast.While, ast.ExceptHandler, ast.Assert, ast.comprehension, ast.match_case)
+
+# Where a class still opens, from inside a method, the file format that is made for it.
+CIRCLES = ("structures", "surrogates")
 
 
 def module_files(package: Path) -> dict[str, Path]:
@@ -57,7 +71,10 @@ def imported_modules(name: str, path: Path, known: set[str], *, at_load: bool) -
         if at_load and runs_later(node):
             continue
         pending.extend(ast.iter_child_nodes(node))
-        if isinstance(node, ast.Import):
+        if isinstance(node, ast.Call) and ast.unparse(node.func).split(".")[-1] in ("import_module", "__import__"):
+            names = [part.value for part in node.args if isinstance(part, ast.Constant)]
+            yield from ((name, node.lineno) for name in names if name in known)
+        elif isinstance(node, ast.Import):
             yield from ((alias.name, node.lineno) for alias in node.names if alias.name in known)
         elif isinstance(node, ast.ImportFrom):
             base = package[: len(package) + 1 - node.level] if node.level else []
@@ -91,18 +108,56 @@ def room_violations(package: Path) -> list[str]:
     return found
 
 
-def import_cycle(package: Path) -> list[str] | None:
-    """Modules that import each other while being loaded, or None."""
+def private_imports(package: Path) -> list[str]:
+    """Every import of a private module of a closed room by another room, as one line each."""
     files = module_files(package)
+    found = []
+    for name, path in files.items():
+        own = name.split(".")[1:2]
+        for target, line in imported_modules(name, path, set(files), at_load=False):
+            room, inside = target.split(".")[1:2], target.split(".")[2:]
+            if set(room) & set(CLOSED) and room != own and any(part.startswith("_") for part in inside):
+                where = path.relative_to(package.parent)
+                found.append(f"{where}:{line} imports {target}; let `{room[0]}` export the name, and import that")
+    return found
+
+
+def import_cycle(package: Path, room: str = "", *, at_load: bool = True) -> list[str] | None:
+    """Modules, of one room if named, that import each other (`at_load`: as they are loaded), or None."""
+    files = module_files(package)
+    inside = [name for name in files if not room or name.split(".")[1:2] == [room]]
     graph = {
-        name: {target for target, _ in imported_modules(name, path, set(files), at_load=True)} - {name}
-        for name, path in files.items()
+        name: {target for target, _ in imported_modules(name, files[name], set(files), at_load=at_load)} - {name}
+        for name in inside
     }
     try:
         graphlib.TopologicalSorter(graph).prepare()
     except graphlib.CycleError as error:
         return error.args[1]
     return None
+
+
+def complexity(function: ast.AST) -> int:
+    """Cyclomatic complexity of a function with those inside it.
+
+    References
+    ----------
+    T. J. McCabe, IEEE Trans. Software Eng. SE-2 (1976) 308.
+    """
+    nodes = list(ast.walk(function))
+    operators = sum(len(node.values) - 1 for node in nodes if isinstance(node, ast.BoolOp))
+    filters = sum(len(node.ifs) for node in nodes if isinstance(node, ast.comprehension))
+    return 1 + sum(isinstance(node, BRANCHES) for node in nodes) + operators + filters
+
+
+def too_large(path: Path) -> Iterator[str]:
+    """A file with more lines, and its functions with more branches, than one reads at once."""
+    text = path.read_text(encoding="utf-8")
+    if (lines := len(text.splitlines())) > MOST_LINES:
+        yield f"{path}: {lines} lines"
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and (found := complexity(node)) > MOST_COMPLEXITY:
+            yield f"{path}:{node.lineno} {node.name} has a complexity of {found}"
 
 
 def build_package(root: Path, files: dict[str, str]) -> Path:
@@ -125,8 +180,17 @@ def test_a_room_imports_only_rooms_listed_above_it():
     assert not room_violations(PACKAGE), "\n".join(room_violations(PACKAGE))
 
 
+def test_no_room_imports_a_private_module_of_a_closed_room():
+    assert not private_imports(PACKAGE), "\n".join(private_imports(PACKAGE))
+
+
 def test_no_modules_import_each_other_in_a_circle():
     assert import_cycle(PACKAGE) is None
+
+
+@pytest.mark.parametrize("room", [room for room in ROOMS if room not in CIRCLES])
+def test_no_modules_of_a_room_import_each_other_in_a_circle_at_any_time(room):
+    assert import_cycle(PACKAGE, room, at_load=False) is None
 
 
 @pytest.mark.parametrize(
@@ -139,6 +203,8 @@ def test_no_modules_import_each_other_in_a_circle():
         "from jfsm import diagnosis",
         "def late():\n    from ..diagnosis import diagnose",
         "from jfsm import diagnose",
+        "import importlib\nimportlib.import_module('jfsm.diagnosis')",
+        "def late():\n    return import_module('jfsm.diagnosis').diagnose",
     ],
 )
 def test_an_import_from_a_lower_room_is_seen_however_it_is_written(tmp_path, statement):
@@ -153,6 +219,33 @@ def test_an_import_from_a_lower_room_is_seen_however_it_is_written(tmp_path, sta
     )
     (violation,) = room_violations(package)
     assert violation.startswith("jfsm/records/_record.py:")
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "from ..plant._stepper import advance",
+        "from ..plant import _stepper",
+        "import jfsm.plant._stepper",
+        "from jfsm.plant._stepper import advance",
+        "def late():\n    from ..plant._stepper import advance",
+    ],
+)
+def test_an_import_of_a_private_module_is_seen_however_it_is_written(tmp_path, statement):
+    package = build_package(
+        tmp_path,
+        {
+            "__init__.py": "",
+            "plant/__init__.py": "from ._stepper import advance as advance",
+            "plant/_stepper.py": "def advance(): ...",
+            "plant/_grid.py": "from ._stepper import advance",
+            "estimation/__init__.py": "",
+            "estimation/_filter.py": statement,
+            "estimation/_motion.py": "from ..plant import advance",
+        },
+    )
+    (violation,) = private_imports(package)
+    assert violation.startswith("jfsm/estimation/_filter.py:")
 
 
 def test_a_module_outside_every_room_is_seen(tmp_path):
@@ -172,6 +265,54 @@ def test_a_circle_of_imports_is_seen(tmp_path):
 def test_an_import_that_loading_passes_over_closes_no_circle(tmp_path, later):
     files = {"records/__init__.py": "", "records/_a.py": later, "records/_b.py": "from ._a import a"}
     assert import_cycle(build_package(tmp_path, {"__init__.py": "", **files})) is None
+
+
+@pytest.mark.parametrize(
+    "later",
+    [
+        "if TYPE_CHECKING:\n    from ._b import b",
+        "def late():\n    from ._b import b",
+        "class A:\n    def late(self):\n        from . import _b",
+    ],
+)
+def test_an_import_that_loading_passes_over_closes_a_circle_at_any_time(tmp_path, later):
+    files = {"records/__init__.py": "", "records/_a.py": later, "records/_b.py": "from ._a import a"}
+    package = build_package(tmp_path, {"__init__.py": "", **files})
+    assert set(import_cycle(package, "records", at_load=False) or ()) == {"jfsm.records._a", "jfsm.records._b"}
+    assert import_cycle(package, "reporting", at_load=False) is None
+
+
+@pytest.mark.parametrize("room", SMALL_ROOMS)
+def test_files_are_short_and_functions_simple(room: str):
+    paths = list((PACKAGE / room).rglob("*.py"))
+    assert paths
+    found = [line for path in paths for line in too_large(path)]
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    ("body", "expected"),
+    [
+        ("return x", 1),
+        ("if x and y or z: pass\n elif w: pass", 5),
+        ("for i in x:\n  while i: pass\n else: pass", 3),
+        ("return [i if i else 0 for i in x if i if y]", 5),
+        ("try: pass\n except E: pass\n except F: pass\n assert x", 4),
+        ("match x:\n  case 1: pass\n  case _: pass", 3),
+        ("def g():\n  if x: pass\n return g", 2),
+    ],
+)
+def test_complexity_counts_branches(body: str, expected: int):
+    assert complexity(ast.parse(f"def f():\n {body}").body[0]) == expected
+
+
+def test_a_file_that_is_too_long_and_a_function_that_is_too_complex_are_seen(tmp_path):
+    path = tmp_path / "_large.py"
+    path.write_text("def f(x):\n    return " + " or ".join("x" * 12) + "\n" * MOST_LINES, encoding="utf-8")
+    assert [line.partition(str(path))[2] for line in too_large(path)] == [
+        f": {MOST_LINES + 1} lines",
+        ":1 f has a complexity of 12",
+    ]
 
 
 def test_importing_jfsm_changes_no_configuration_and_prints_nothing():

@@ -8,20 +8,13 @@ import pytest
 from references import between_wells
 
 import jfsm
-from jfsm.diagnosis._akin import resting
-from jfsm.diagnosis._begin import Begin, Start
-from jfsm.diagnosis._candidates import (
-    Candidate,
-    Laws,
-    candidates,
-    chosen_causes,
-    contained,
-    elsewhere,
-    hypothesis,
-    own_paths,
-    promising,
-)
-from jfsm.diagnosis._effect import Effect
+from jfsm.diagnosis.hypotheses.candidate import Candidate, contained, elsewhere, promising
+from jfsm.diagnosis.hypotheses.candidates import candidates, chosen_causes
+from jfsm.diagnosis.hypotheses.effect import Effect
+from jfsm.diagnosis.hypotheses.initial_values import Begin, Start
+from jfsm.diagnosis.hypotheses.parametrisation import hypothesis, own_paths
+from jfsm.diagnosis.hypotheses.placement import Laws
+from jfsm.diagnosis.search.related_laws import resting
 from jfsm.identification import LANES, Nuisances, Posterior, prepare
 
 CHAIN = jfsm.Structure.chain([1.0, 1.0], [20.0, 20.0], [0.2, 0.2])
@@ -61,7 +54,7 @@ def test_programs_are_those_of_a_few_classes_of_laws_whatever_the_place(shaken):
         for begin in candidate.starts[:LANES]:
             seen = shaken.resolving([begin])
             posterior = Posterior(hypothesis(CHAIN, [begin], [seen]), [seen])
-            needed.setdefault((posterior.program, seen.fine.substeps), set()).add(candidate.effects[0].cause.id)
+            needed.setdefault((posterior.program, seen.inputs.substeps), set()).add(candidate.effects[0].cause.id)
     shared = {name for names in needed.values() if len(names) > 1 for name in names}
     assert shared > {"cubic_hardening", "force_gain", "coulomb", "stribeck", "jenkins", "bouc_wen"}
     by_class = {program for program, _ in needed}

@@ -8,12 +8,12 @@ import pytest
 
 import jfsm
 from jfsm.demo import DAMPING, FRICTION, MASS, STIFFNESS, hidden_friction
-from jfsm.diagnosis._chance import beside_chance, noise_beyond
-from jfsm.diagnosis._gain import BASE, remeasured
-from jfsm.diagnosis._problem import Problem
-from jfsm.diagnosis._search import fit_model
-from jfsm.diagnosis._trial import Trial
 from jfsm.diagnosis.evidence.excess import is_noise_only
+from jfsm.diagnosis.evidence.fitted import Trial
+from jfsm.diagnosis.evidence.free_runs import BASE, remeasured
+from jfsm.diagnosis.evidence.noise_draws import beside_chance, noise_beyond
+from jfsm.diagnosis.evidence.setup import Problem
+from jfsm.diagnosis.search.baseline import fit_model
 from jfsm.diagnosis.thresholds import THRESHOLDS
 from jfsm.identification import prepare_all
 from jfsm.structures import Coulomb

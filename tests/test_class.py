@@ -3,9 +3,9 @@
 import pytest
 
 import jfsm
-from jfsm.diagnosis._class import class_of
 from jfsm.diagnosis._diagnosis import Finding, Rival
-from jfsm.diagnosis._report import _said
+from jfsm.diagnosis.report.law_class import class_of
+from jfsm.diagnosis.report.sentences import finding_sentence
 
 PEAK, SPEED = 2.0, 3.0
 LAWS = {
@@ -88,4 +88,4 @@ def test_where_the_law_is_open_its_class_comes_first(probability: float, kind_pr
         "hardening stiffness",
         kind_probability,
     )
-    assert _said(shown, jfsm.causes()).startswith(f"The model lacks {words}")
+    assert finding_sentence(shown, jfsm.causes()).startswith(f"The model lacks {words}")

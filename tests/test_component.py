@@ -11,10 +11,10 @@ from typer.testing import CliRunner
 
 import jfsm
 from jfsm.cli import app
-from jfsm.diagnosis._clipped import limited
-from jfsm.dynamics._imposed import imposed_motion
+from jfsm.diagnosis.channels.clipping import limited
 from jfsm.identification import Hypothesis, Posterior, nuisance_unknowns, prepare, with_offsets
 from jfsm.identification._unknowns import free_unknown
+from jfsm.plant import imposed_motion
 
 T = 3.0 + 0.02 * np.arange(600)
 TONES = ((2.0, 0.1, 1.0), (5.0, 1.3, 0.5), (9.0, 2.2, 0.3))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.diagnosis._course import course
-from jfsm.diagnosis._residual import Residual, agreement
+from jfsm.diagnosis.evidence.missing_force import Residual, agreement
+from jfsm.diagnosis.report.residual_signals import course
 from jfsm.surrogates import RKPM
 
 STEP, PERIOD = 0.02, 1.5

@@ -6,7 +6,7 @@ import pytest
 from test_diagnose import DAMPING, FEW, MASS, STIFFNESS, linear, made
 
 import jfsm
-from jfsm.diagnosis._detectable import _significant
+from jfsm.diagnosis.advice.detection_limits import _significant
 from jfsm.structures import causes
 
 RIGHT = jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING)

@@ -8,10 +8,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jfsm
-from jfsm.diagnosis import _diagnose, _weighed
-from jfsm.diagnosis._candidates import Candidate, as_promising, promising
-from jfsm.diagnosis._effect import Effect
-from jfsm.diagnosis._gain import Gain
+from jfsm.diagnosis import _diagnose
+from jfsm.diagnosis.evidence import measured
+from jfsm.diagnosis.evidence.free_runs import Gain
+from jfsm.diagnosis.hypotheses.candidate import Candidate, as_promising, promising
+from jfsm.diagnosis.hypotheses.effect import Effect
 from jfsm.identification import _likelihood
 
 MASS, STIFFNESS, DAMPING, CUBIC = 2.0, 18.0, 0.5, 4.0
@@ -79,7 +80,7 @@ def decided(searched, believed, monkeypatch):
 
     def of(gain: Gain) -> jfsm.Diagnosis:
         monkeypatch.setattr(_diagnose, "_looked_into", lambda *arguments: searched)
-        monkeypatch.setattr(_weighed, "measure_gain", lambda *arguments: (gain, []))
+        monkeypatch.setattr(measured, "measure_gain", lambda *arguments: (gain, []))
         return jfsm.diagnose(made(duffing), believed, causes=FEW, key=jax.random.key(0))
 
     return of
@@ -449,7 +450,7 @@ def test_where_no_law_fits_those_are_fitted_too_that_explain_less_of_the_missing
         left_out = [c for c in tried if c.effects[0].cause.id == "cubic_hardening"]
         return [c for c in tried if c not in left_out], left_out
 
-    monkeypatch.setattr("jfsm.diagnosis._study.promising", last)
+    monkeypatch.setattr("jfsm.diagnosis.search.rounds.promising", last)
     causes = ("cubic_hardening", "quadratic_damping", "coulomb")
     d = jfsm.diagnose(made(duffing), believed, causes=causes, max_causes=1, key=jax.random.key(0))
     assert [f.cause for f in d.findings] == ["cubic_hardening"]

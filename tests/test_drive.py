@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.dynamics._drive import reconstruct
-from jfsm.dynamics._excitation import bucket, excitation
+from jfsm.plant import bucket, excitation
+from jfsm.plant._drive import reconstruct
 
 METHODS = ("band-limited", "linear", "hold")
 EDGE = 32  # half width of the band-limited reconstruction: within it of an end the signal has to be guessed
@@ -79,36 +79,36 @@ def record(n: int = 90, **channels) -> jfsm.Record:
 
 @pytest.mark.parametrize("method", ["band-limited", "linear"])
 def test_each_interval_of_a_drive_begins_where_the_one_before_it_ends(method):
-    fine = excitation(record(), 1, 4, method)
-    assert fine.substeps == 4
-    np.testing.assert_array_equal(fine.force[1:, 0], fine.force[:-1, -1])
-    np.testing.assert_array_equal(fine.force[:, 0, 0], record().channels["force", 1])
+    inputs = excitation(record(), 1, 4, method)
+    assert inputs.substeps == 4
+    np.testing.assert_array_equal(inputs.force[1:, 0], inputs.force[:-1, -1])
+    np.testing.assert_array_equal(inputs.force[:, 0, 0], record().channels["force", 1])
 
 
 def test_a_held_drive_is_constant_in_every_interval_and_jumps_between_them():
-    fine = excitation(record(), 1, 2, "hold")
-    np.testing.assert_array_equal(fine.force[..., 0], np.repeat(record().channels["force", 1][:, None], 5, axis=1))
+    inputs = excitation(record(), 1, 2, "hold")
+    np.testing.assert_array_equal(inputs.force[..., 0], np.repeat(record().channels["force", 1][:, None], 5, axis=1))
 
 
 def test_a_drive_does_not_depend_on_what_comes_after_the_record_ends():
     ramp = jfsm.Record(time=np.arange(90.0), force=np.arange(90.0))
-    fine = excitation(ramp, 1, 1)
-    np.testing.assert_allclose(fine.force[:-1, 1, 0], np.arange(89) + 0.5, atol=2e-4)
+    inputs = excitation(ramp, 1, 1)
+    np.testing.assert_allclose(inputs.force[:-1, 1, 0], np.arange(89) + 0.5, atol=2e-4)
 
 
 def test_a_drive_runs_on_the_clock_of_the_record_and_is_padded_with_its_last_value():
-    fine = excitation(record(), 2, 2, length=112)
-    assert fine.force.shape == (112, 5, 2)
-    assert np.all(fine.force[89:, :, 0] == fine.force[88, -1, 0]), "what a late sensor would have shown next"
-    assert not np.any(fine.force[:, :, 1]), "no force is applied where none is measured"
-    np.testing.assert_allclose(fine.time, 5.0 + 0.1 * np.arange(112), rtol=1e-13)
+    inputs = excitation(record(), 2, 2, length=112)
+    assert inputs.force.shape == (112, 5, 2)
+    assert np.all(inputs.force[89:, :, 0] == inputs.force[88, -1, 0]), "what a late sensor would have shown next"
+    assert not np.any(inputs.force[:, :, 1]), "no force is applied where none is measured"
+    np.testing.assert_allclose(inputs.time, 5.0 + 0.1 * np.arange(112), rtol=1e-13)
 
 
 def test_the_motion_of_the_base_is_part_of_the_drive():
     base = np.sin(np.arange(90.0))
-    fine = excitation(record(base_acceleration=base), 1, 2)
-    np.testing.assert_array_equal(fine.base[:90, 0], base)
-    assert not np.any(fine.force)
+    inputs = excitation(record(base_acceleration=base), 1, 2)
+    np.testing.assert_array_equal(inputs.base[:90, 0], base)
+    assert not np.any(inputs.force)
 
 
 @pytest.mark.parametrize("n", [2, 64, 65, 80, 81, 128, 129, 160, 161, 1000, 5001])

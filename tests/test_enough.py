@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.diagnosis._effect import Effect
-from jfsm.diagnosis._enough import settled, something_left
-from jfsm.diagnosis._study import shows_later
 from jfsm.diagnosis.evidence.own_values import at_bounds, prior_cost
 from jfsm.diagnosis.evidence.prediction import Prediction
 from jfsm.diagnosis.evidence.scorecard import OtherShapes
+from jfsm.diagnosis.hypotheses.effect import Effect
+from jfsm.diagnosis.search.stopping import settled, something_left
+from jfsm.diagnosis.search.study import shows_later
 from jfsm.identification import Unknown
 
 NOISE = 1e-4

@@ -10,9 +10,8 @@ from scipy.linalg import expm
 from scipy.stats import multivariate_normal
 
 import jfsm
-from jfsm.dynamics._excitation import excitation
-from jfsm.dynamics._plant import lower, readout
 from jfsm.estimation import Innovations, ProcessNoise, Readings, Start, innovations
+from jfsm.plant import excitation, lower, observation_of
 from jfsm.structures import (
     AccelerationGain,
     AttachedOscillator,
@@ -68,7 +67,7 @@ def filtered(
     fill = ((0, length - N), (0, 0))
     return RUN(
         lower(model, CHANNELS),
-        readout(CHANNELS, 2),
+        observation_of(CHANNELS, 2),
         excitation(record, 2, 4, "linear", length=length),
         Readings(
             jnp.asarray(np.pad(readings, fill, constant_values=7.0)),
@@ -226,7 +225,7 @@ def test_while_a_link_sticks_nothing_is_uncertain_about_its_speed():
     values, n = np.zeros((32, 2)), 32
     found = RUN(
         lower(model, channels),
-        readout(channels, 1),
+        observation_of(channels, 1),
         excitation(jfsm.Record(DT * np.arange(n), np.sin(np.arange(n))), 1, 2, "linear"),
         Readings(jnp.asarray(values), jnp.ones((n, 2)), jnp.asarray([1e-4, 1e-4]), jnp.ones(n)),
         ProcessNoise(jnp.asarray([[0.1]])),
@@ -272,7 +271,7 @@ def rubbed(readings, force, noise: float, forgiven: float, x0: float) -> Innovat
     n = readings.shape[0]
     return RUN(
         lower(RUBBED, ACCELERATION),
-        readout(ACCELERATION, 1),
+        observation_of(ACCELERATION, 1),
         excitation(jfsm.Record(STEP * np.arange(n), force), 1, SUBSTEPS, "band-limited"),
         Readings(readings[:, None], jnp.ones((n, 1)), jnp.asarray([noise**2]), jnp.ones(n)),
         ProcessNoise(jnp.asarray([[forgiven**2]])),

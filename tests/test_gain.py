@@ -7,8 +7,8 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 import jfsm
-from jfsm.diagnosis._gain import _interval, how_run, measure_gain
-from jfsm.diagnosis._holdout import HeldOut
+from jfsm.diagnosis.evidence.free_runs import _interval, how_run, measure_gain
+from jfsm.diagnosis.evidence.split import HeldOut
 from jfsm.identification import prepare
 
 BEFORE, AFTER, FLOOR = 0.8, 0.2, 0.1

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.diagnosis._holdout import split
+from jfsm.diagnosis.evidence.split import split
 
 T = np.arange(2000) * 0.01
 RNG = np.random.default_rng(3)

@@ -6,8 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jfsm.dynamics import _kernel
-from jfsm.dynamics._kernel import as_one_kernel, jit_with_kernels
+from jfsm.plant import _kernel, as_one_kernel, jit_with_kernels
 
 MATRIX = np.array([[2.0, 0.3, 0.0], [0.1, 3.0, 0.2], [0.0, 0.5, 2.5]])
 

@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jfsm
-from jfsm.diagnosis._lack_of_fit import LackOfFit
-from jfsm.diagnosis._problem import Problem
-from jfsm.diagnosis._search import fit_model
+from jfsm.diagnosis.evidence.lack_of_fit import LackOfFit
+from jfsm.diagnosis.evidence.setup import Problem
+from jfsm.diagnosis.search.baseline import fit_model
 from jfsm.identification import prepare_all
 from jfsm.structures import CubicStiffness
 

@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from test_diagnose import DAMPING, MASS, STEP, STIFFNESS, duffing, linear, made
 
 import jfsm
-from jfsm.diagnosis._late import showing_late
+from jfsm.diagnosis.channels.delays import showing_late
 
 RIGHT = jfsm.Structure.sdof(MASS, STIFFNESS, DAMPING)
 CHANNELS = ("displacement", "acceleration")

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.dynamics._grid import Fine, drive_before, punctual
-from jfsm.dynamics._plant import lower
 from jfsm.identification import (
     Hypothesis,
     Nuisances,
@@ -23,8 +21,9 @@ from jfsm.identification import (
     prepare,
     with_offsets,
 )
-from jfsm.identification._drive import forces_before, punctual_force
+from jfsm.identification._drive import forces_before, undelayed_force
 from jfsm.identification._posterior import prior
+from jfsm.plant import InterpolatedInput, drive_before, lower, undelayed
 from jfsm.structures import AbstractTerm
 
 N, DT = 200, 0.05
@@ -181,11 +180,11 @@ def test_delays_that_begin_far_apart_run_side_by_side(single_nuisances):
 
 @pytest.mark.parametrize("delay", [0.0, 0.3, -1.7])
 def test_what_drives_a_late_sensor_is_the_same_on_the_host_as_in_a_run(single_nuisances, delay):
-    fine, plant = single_nuisances.fine, lower(SINGLE + jfsm.structures.ForceDelay(delay * DT, at=("force", 1)))
-    there = punctual(plant, fine).force
-    np.testing.assert_allclose(punctual_force(np.asarray(fine.force), np.array([delay])), there, atol=1e-12)
-    force, base = drive_before(fine, jnp.asarray(delay * DT))
-    here = forces_before(fine, delay * DT)
+    inputs, plant = single_nuisances.inputs, lower(SINGLE + jfsm.structures.ForceDelay(delay * DT, at=("force", 1)))
+    there = undelayed(plant, inputs).force
+    np.testing.assert_allclose(undelayed_force(np.asarray(inputs.force), np.array([delay])), there, atol=1e-12)
+    force, base = drive_before(inputs, jnp.asarray(delay * DT))
+    here = forces_before(inputs, delay * DT)
     np.testing.assert_allclose(here, np.concatenate([force, np.asarray(base)[..., None]], 2), atol=1e-12)
 
 
@@ -251,8 +250,8 @@ def test_noise_in_the_motion_of_the_base_drives_all_masses():
     )
     nuisances = prepare(record, MODEL)
     assert nuisances.base_floor == pytest.approx(noise, rel=0.1)
-    assert isinstance(nuisances.fine, Fine)
-    left = float(np.std(np.asarray(nuisances.fine.base)[: time.size, 0] - shaken))
+    assert isinstance(nuisances.inputs, InterpolatedInput)
+    left = float(np.std(np.asarray(nuisances.inputs.base)[: time.size, 0] - shaken))
     assert left < 0.5 * noise, "the noise is smoothed away as far as the band of the motion lets it be"
     inertia = np.array([1.3, 0.8])
     density = nuisances.force_covariance / np.outer(inertia, inertia)
@@ -334,8 +333,8 @@ def test_steps_are_short_enough_for_the_stiffest_structure_asked_for_and_the_dri
     stiff = MODEL + jfsm.LuGre(1.0, 1.0, 0.1, 2000.0, 20.0, at=(0, 1))
     assert chain_nuisances.resolving([MODEL, MODEL + jfsm.CubicStiffness(2.0, at=(0, 1))]) is chain_nuisances
     finer = chain_nuisances.resolving([MODEL, stiff])
-    assert finer.fine.substeps >= 4 * chain_nuisances.fine.substeps
-    coarse, fine = (np.asarray(n.fine.force) for n in (chain_nuisances, finer))
+    assert finer.inputs.substeps >= 4 * chain_nuisances.inputs.substeps
+    coarse, fine = (np.asarray(n.inputs.force) for n in (chain_nuisances, finer))
     every = (fine.shape[1] - 1) // (coarse.shape[1] - 1)
     np.testing.assert_allclose(fine[: N - 1, ::every], coarse[: N - 1], atol=1e-9 * np.max(np.abs(coarse)))
     assert finer.readings is chain_nuisances.readings
@@ -344,7 +343,7 @@ def test_steps_are_short_enough_for_the_stiffest_structure_asked_for_and_the_dri
 @pytest.mark.parametrize("at", [(0, 1), (1, 2)])
 def test_steps_follow_a_spring_that_hardens_wherever_it_is(at, chain_nuisances):
     stiff = MODEL + jfsm.CubicStiffness(1e6, at=at)
-    assert chain_nuisances.resolving([stiff]).fine.substeps >= 4 * chain_nuisances.fine.substeps
+    assert chain_nuisances.resolving([stiff]).inputs.substeps >= 4 * chain_nuisances.inputs.substeps
 
 
 def test_the_start_is_first_guessed_from_what_is_measured(chain_nuisances):

@@ -40,8 +40,8 @@ def scene_and_runs():
 
 @pytest.mark.parametrize("gaps", ["none", "scattered", "one channel, then all"])
 @pytest.mark.parametrize("pushed", [False, True])
-@pytest.mark.parametrize("struck", [0.0, 1e-3])  # velocities, so that the covariance settles within the record
-def test_runs_that_share_gains_tell_what_each_would_tell_by_itself(scene_and_runs, gaps, pushed, struck):
+@pytest.mark.parametrize("process_noise", [0.0, 1e-3])  # so that the covariance settles within the record
+def test_runs_that_share_gains_tell_what_each_would_tell_by_itself(scene_and_runs, gaps, pushed, process_noise):
     scene, runs = scene_and_runs
     assert is_linear(scene)
     use = np.array(scene.readings.use)
@@ -51,7 +51,7 @@ def test_runs_that_share_gains_tell_what_each_would_tell_by_itself(scene_and_run
     elif gaps != "none":
         use[50:120, 1], use[200:230] = 0.0, 0.0
     push = 0.1 * rng.standard_normal((len(runs.numbers), N, 3)) if pushed else None
-    asked = Runs(runs.numbers, runs.velocity + struck * np.eye(3), use, push)
+    asked = Runs(runs.numbers, runs.velocity + process_noise * np.eye(3), use, push)
     found, known = linear_innovations(scene, asked, N), innovations_of(scene, asked, N)
     spread = np.sqrt(known.variance)
     np.testing.assert_allclose(found.error / spread, known.error / spread, rtol=0, atol=1e-8)

@@ -105,7 +105,7 @@ def test_one_link_of_several_is_mapped_by_its_own_motion():
 
 
 def test_readings_that_share_their_errors_count_as_fewer():
-    from jfsm.diagnosis._map_force import _widening
+    from jfsm.mapping.learned_map import _widening
 
     states = np.random.default_rng(0).uniform(-1, 1, (2000, 2))
     flat = jfsm.RKPM.fit(states, states[:, 0], order=1)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.dynamics import lower
+from jfsm.plant import lower
 
 M = np.diag([2.0, 1.0, 3.0])
 K = np.array([[360.0, -240.0, 0.0], [-240.0, 300.0, -60.0], [0.0, -60.0, 60.0]])

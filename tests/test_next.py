@@ -11,7 +11,9 @@ from scipy.interpolate import CubicSpline
 
 import jfsm
 from jfsm._result import Result
-from jfsm.diagnosis._next import Leading, Variation, _made, _plan, _tried, same_force
+from jfsm.diagnosis.advice import next_test
+from jfsm.diagnosis.advice.next_test import Leading, _made, _tried, same_force
+from jfsm.diagnosis.advice.variation import Variation, planned_record
 from jfsm.identification import prepare
 
 MASS, STIFFNESS, DAMPING = 1.0, 40.0, 0.5
@@ -75,7 +77,7 @@ def test_a_test_in_which_a_rival_might_run_away_is_none(undecided):
     softening = next(t for t in leading.rivals if t.name == "cubic_softening")
 
     def follows(level: float) -> bool:
-        plan = _plan(leading.nuisances.record[: leading.samples], Variation(level=level))
+        plan = planned_record(leading.nuisances.record[: leading.samples], Variation(level=level))
         return jfsm.simulate(softening.extended(), plan, solver="grid").result == Result.successful
 
     level = 1.0
@@ -88,7 +90,7 @@ def test_a_test_in_which_a_rival_might_run_away_is_none(undecided):
 
 
 def test_where_no_test_tells_much_the_best_is_proposed_longer_and_tells_more(undecided, monkeypatch):
-    monkeypatch.setattr(Leading, "tests", lambda leading: [Variation(speed=0.7), Variation(level=1.5)])
+    monkeypatch.setattr(next_test, "variations", lambda nuisances: [Variation(speed=0.7), Variation(level=1.5)])
     found = undecided.next_tests(key=jax.random.key(3))
     lengths = [len(p.record) for p in found]
     assert len(found) == 4 and max(lengths) == lengths[0] == 16 * min(lengths)

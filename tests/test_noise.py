@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.diagnosis._clipped import limited
+from jfsm.diagnosis.channels.clipping import limited
 from jfsm.identification._channels import driving
 from jfsm.records import clipped, noise_floor, spikes
 from jfsm.records._flat_top import flat_top_std

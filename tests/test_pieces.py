@@ -6,7 +6,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jfsm
-from jfsm.diagnosis._pieces import pieces
+from jfsm.diagnosis.search.segments import pieces
 
 RNG = np.random.default_rng(8)
 N, DT = 60_000, 0.05

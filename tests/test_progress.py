@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from jfsm.diagnosis._steps import Steps
+from jfsm.diagnosis.search.steps import Steps
 from jfsm.reporting import shown_by_default, stages
 from jfsm.reporting._progress import TimeLeft, bar
 

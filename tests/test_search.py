@@ -10,26 +10,20 @@ from scipy.integrate import solve_ivp
 
 import jfsm
 from jfsm._limit import UNLIMITED
-from jfsm.diagnosis import _search
-from jfsm.diagnosis._akin import beside_a_spring, instead_of, late_instead, special_cases
-from jfsm.diagnosis._begin import Begin, Start, begun
-from jfsm.diagnosis._candidates import (
-    Candidate,
-    Laws,
-    candidates,
-    chosen_causes,
-    hypothesis,
-)
-from jfsm.diagnosis._effect import Effect
-from jfsm.diagnosis._pairs import crossed, instead, pairs
-from jfsm.diagnosis._problem import Problem
-from jfsm.diagnosis._score import Replaced, gains
-from jfsm.diagnosis._search import (
-    Found,
-    LeftBehind,
-    fit_model,
-    groups,
-    refit_from,
+from jfsm.diagnosis.evidence.score_test import Replaced, gains
+from jfsm.diagnosis.evidence.setup import Problem
+from jfsm.diagnosis.hypotheses.candidate import Candidate
+from jfsm.diagnosis.hypotheses.candidates import candidates, chosen_causes
+from jfsm.diagnosis.hypotheses.effect import Effect
+from jfsm.diagnosis.hypotheses.initial_values import Begin, Start, begun
+from jfsm.diagnosis.hypotheses.parametrisation import hypothesis
+from jfsm.diagnosis.hypotheses.placement import Laws
+from jfsm.diagnosis.search import batches
+from jfsm.diagnosis.search.baseline import fit_model, refit_from
+from jfsm.diagnosis.search.batches import Found, LeftBehind, groups
+from jfsm.diagnosis.search.pairs import crossed, instead, pairs
+from jfsm.diagnosis.search.related_laws import beside_a_spring, instead_of, late_instead, special_cases
+from jfsm.diagnosis.search.searches import (
     search,
     search_again,
     search_akin,
@@ -274,7 +268,7 @@ def found_beside_friction(records: Any, *parts: Any, cause: str) -> Any:
         theta=theta,
         evidence=0.0,
         covariance=1e-6 * np.eye(theta.size),
-        steps=tuple(n.fine.substeps for n in records),
+        steps=tuple(n.inputs.substeps for n in records),
     )
 
 
@@ -319,9 +313,9 @@ def test_a_number_with_which_the_motion_runs_away_says_nothing_of_what_a_force_w
 def test_a_trial_is_looked_at_in_steps_no_longer_than_those_it_was_fitted_in(with_friction, fitted):
     records = with_friction.records
     _, refitted = fitted
-    assert refitted.steps == (records[0].fine.substeps,)
-    finer = replace(refitted, steps=(4 * records[0].fine.substeps,))
-    assert with_friction.posterior_of(finer).records[0].fine.substeps == finer.steps[0]
+    assert refitted.steps == (records[0].inputs.substeps,)
+    finer = replace(refitted, steps=(4 * records[0].inputs.substeps,))
+    assert with_friction.posterior_of(finer).records[0].inputs.substeps == finer.steps[0]
     assert with_friction.posterior_of(replace(refitted, steps=(1,))).records[0] is records[0]
 
 
@@ -430,11 +424,11 @@ def test_starts_that_begin_best_where_more_or_less_is_forgiven_both_climb(monkey
         Start({0.03: 1.0, 0.01: 3.0}, -4.0),
     ]
     monkeypatch.setattr(
-        _search,
+        batches,
         "rungs",
         lambda start, ladder, limit: (SimpleNamespace(value=np.array([start.top * share])) for share in (0.1, 1.0)),
     )
-    lot = object.__new__(_search._Lot)
+    lot = object.__new__(batches.Batch)
     lot.limit = UNLIMITED
     stood = list(lot._climb(starts, ("first", "second", "third"), 1, (0.1, 0.03, 0.01)))  # pyright: ignore
     assert [float(found.value[0]) for found in stood] == [-0.5, -5.0]

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from jfsm.diagnosis._residual import Residual
-from jfsm.diagnosis._shape import Shape, shape_of
+from jfsm.diagnosis.evidence.missing_force import Residual
+from jfsm.diagnosis.report.force_shape import Shape, shape_of
 from jfsm.surrogates import RKPM
 
 NOISE = 0.05

@@ -9,8 +9,7 @@ from references import held, rows, smooth_motion, sticking_motion, straight
 
 import jfsm
 from jfsm._result import Result
-from jfsm.dynamics._grid import Fine, run_grid
-from jfsm.dynamics._plant import lower
+from jfsm.plant import InterpolatedInput, lower, run_grid
 from jfsm.structures import AccelerationGain, ForceGain, MapTerm, Offset
 
 N, DT = 300, 0.05
@@ -103,12 +102,12 @@ def test_a_run_with_friction_agrees_with_events_located_by_scipy(others):
     assert apart(run.velocity, v) < 2e-4
 
 
-def exact_drive(force, time, substeps: int) -> Fine:
+def exact_drive(force, time, substeps: int) -> InterpolatedInput:
     """A drive whose half steps are the force itself, with no error of reconstruction."""
     step = time[1] - time[0]
     inner = time[:, None] + step * np.arange(2 * substeps + 1) / (2 * substeps)
     values = force(inner)[..., None]
-    return Fine(jnp.asarray(values), jnp.zeros(inner.shape), jnp.asarray(time), jnp.asarray(step))
+    return InterpolatedInput(jnp.asarray(values), jnp.zeros(inner.shape), jnp.asarray(time), jnp.asarray(step))
 
 
 @pytest.mark.parametrize("friction", [0.0, 2.0])
@@ -121,8 +120,8 @@ def test_halving_the_steps_divides_the_error_by_sixteen_with_and_without_frictio
     assert events > 10 or not friction
     errors = []
     for substeps in (1, 2, 4, 8):
-        fine = exact_drive(tones, time, substeps)
-        found, _, _ = run_grid(lower(model), fine, jnp.asarray([0.3]), jnp.zeros(1))
+        inputs = exact_drive(tones, time, substeps)
+        found, _, _ = run_grid(lower(model), inputs, jnp.asarray([0.3]), jnp.zeros(1))
         errors.append(np.sqrt(np.mean((np.asarray(found) - x) ** 2)))
     rate = np.log2(errors[0] / errors[-1]) / 3
     assert rate == pytest.approx(4.0, abs=0.5), errors

@@ -9,9 +9,9 @@ from scipy.interpolate import make_interp_spline
 
 import jfsm
 from jfsm.dynamics._agreement import PARTED, agreement
-from jfsm.dynamics._drive import reconstruct
-from jfsm.dynamics._excitation import excitation
 from jfsm.dynamics._reference import coarser
+from jfsm.plant import excitation
+from jfsm.plant._drive import reconstruct
 
 PERIOD, DAMPING = 2 * np.pi, 0.1
 TIME = PERIOD / 40 * np.arange(30 * 40)
@@ -136,9 +136,9 @@ def test_runs_agree_until_their_difference_is_as_large_as_a_tenth_of_the_motion(
 @pytest.mark.parametrize("method", ["band-limited", "linear", "hold"])
 def test_a_drive_known_on_every_second_half_step_is_nearly_the_same(method):
     record = jfsm.Record(TIME, noise(0.4), base_acceleration=SINE)
-    fine = excitation(record, 1, 16, method)
-    thin = coarser(fine)
-    for whole, part in ((fine.force, thin.force), (fine.base, thin.base)):
+    inputs = excitation(record, 1, 16, method)
+    thin = coarser(inputs)
+    for whole, part in ((inputs.force, thin.force), (inputs.base, thin.base)):
         np.testing.assert_allclose(part, whole, atol=1e-4)
         assert (method == "band-limited") == (np.max(np.abs(np.asarray(part - whole))) > 1e-13)
 

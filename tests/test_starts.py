@@ -10,12 +10,9 @@ from references import driven_readings, three_tones
 from scipy.integrate import solve_ivp
 
 import jfsm
-from jfsm.dynamics import lower
-from jfsm.dynamics._along import force_along
-from jfsm.dynamics._law_along import forces_of_law
-from jfsm.dynamics._start import starting_state
 from jfsm.estimation import Latent
 from jfsm.identification import about_a_rest, missing_force, place, prepare, scale_of, starts
+from jfsm.plant import force_along, forces_of_law, lower, starting_state
 
 T = np.arange(1200) * 0.06
 MODEL = jfsm.Structure.sdof(1.0, 9.0, 0.3)

@@ -8,9 +8,9 @@ from references import between_wells
 from scipy.integrate import solve_ivp
 
 import jfsm
-from jfsm.diagnosis._problem import Problem
-from jfsm.diagnosis._search import fit_model
-from jfsm.diagnosis._steady import unsteady
+from jfsm.diagnosis.channels.stationarity import unsteady
+from jfsm.diagnosis.evidence.setup import Problem
+from jfsm.diagnosis.search.baseline import fit_model
 from jfsm.identification import prepare_all
 
 N, DT = 3000, 0.05

@@ -1,6 +1,8 @@
 """Structures: what they are made of, how their numbers are named, and what a model file may hold."""
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any, cast
 
@@ -9,8 +11,7 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.dynamics._forces import smooth_force
-from jfsm.dynamics._plant import direction, lower
+from jfsm.plant import direction, lower, smooth_force
 from jfsm.structures import AbstractTerm, AccelerationGain, ForceGain, MapTerm, Offset
 from jfsm.structures.terms import TERMS
 from jfsm.surrogates import tabulate
@@ -246,6 +247,19 @@ def test_maps_are_kept_in_files_beside_the_structure(tmp_path):
     d, w = jnp.asarray(0.3), jnp.asarray(-0.2)
     for mine, theirs in zip(loaded.terms[-2:], model.terms[-2:], strict=True):
         assert mine.force(d, w, (), d) == theirs.force(d, w, (), d)
+
+
+@pytest.mark.parametrize("front", ["from jfsm import Structure", "from jfsm.structures import Structure"])
+def test_a_structure_with_a_map_loads_before_anything_else_is_imported(tmp_path, front):
+    path = tmp_path / "model.toml"
+    (jfsm.Structure([1.0]) + learned().on((0, 1))).save(path)
+    program = f"""import sys, jax
+jax.config.update("jax_enable_x64", True)
+{front}
+assert "jfsm.surrogates" not in sys.modules
+print(Structure.load({str(path)!r}).terms[0].force_map.dim)"""
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert run.stdout.strip() == "2", run.stderr
 
 
 def test_a_structure_and_its_maps_are_written_together_or_not_at_all(tmp_path, monkeypatch):

@@ -7,9 +7,10 @@ import pytest
 from references import driven_readings
 
 import jfsm
-from jfsm.diagnosis._candidates import Candidate, candidates, chosen_causes
-from jfsm.diagnosis._pairs import pairs
-from jfsm.diagnosis._problem import Problem
+from jfsm.diagnosis.evidence.setup import Problem
+from jfsm.diagnosis.hypotheses.candidate import Candidate
+from jfsm.diagnosis.hypotheses.candidates import candidates, chosen_causes
+from jfsm.diagnosis.search.pairs import pairs
 from jfsm.identification import missing_force, place, place_together, prepare, scale_of
 
 T = np.arange(1200) * 0.06

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.diagnosis._effect import Effect
-from jfsm.diagnosis._untold import in_step, untold
+from jfsm.diagnosis.evidence.identifiable import in_step, untold
+from jfsm.diagnosis.hypotheses.effect import Effect
 from jfsm.identification import prepare
 from jfsm.structures import ParametricStiffness, PeriodicDisturbance
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jfsm
-from jfsm.diagnosis._trial import extent, windows
+from jfsm.diagnosis.evidence.fitted import extent, windows
 from jfsm.identification import Nuisances, prepare
 
 MASS, DAMPING = 2.0, 8.0
@@ -45,4 +45,4 @@ def test_steps_of_a_decay_are_short_enough_for_its_beginning():
     model = jfsm.Structure.sdof(mass=MASS, stiffness=58.0, damping=DAMPING)
     bristles = model + jfsm.LuGre(0.1, 0.1, 1.0, 20.0, 1.0, at=(0, 1))  # 20/0.1·5 = 1000 rad/s at first
     n = prepare(jfsm.Record(time, None, x, v), model).resolving([bristles])
-    assert 1000.0 * n.record.dt / n.fine.substeps < 2.8  # where Runge-Kutta of order four is stable
+    assert 1000.0 * n.record.dt / n.inputs.substeps < 2.8  # where Runge-Kutta of order four is stable

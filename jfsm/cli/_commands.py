@@ -189,7 +189,7 @@ def map(
     report: Annotated[Path | None, option("Write the page here, as HTML.")] = None,
 ) -> None:
     """Map the force of a record, or what a model lacks of it, over displacement and velocity."""
-    from ..diagnosis import map_force
+    from ..mapping import map_force
 
     inputs = [source.record] if model is None else [source.record, model]
     check_outputs({"--out": out, "--report": report}, inputs)

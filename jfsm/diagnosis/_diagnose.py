@@ -8,26 +8,28 @@ import jax
 from .._limit import Limit, ended_by_interrupt
 from .._programs import programs_kept
 from .._types import require_x64
-from ..dynamics import Reconstruction
+from ..plant import Reconstruction
 from ..records import Record
 from ..reporting import shown_by_default
 from ..structures import Cause, Structure
-from ._candidates import Candidate, chosen_causes
-from ._clipped import limited
-from ._detectable import Silence, detectable, naturally_detectable
 from ._diagnosis import Diagnosis
-from ._holdout import HeldOut, split
-from ._late import Late, in_time, showing_late, slightly_late
-from ._next import Leading
-from ._problem import Problem
-from ._report import Reached, Tested, assemble
-from ._residual import residual
-from ._steps import Progress, Steps
-from ._study import Searched, Study
-from ._trial import Trial
-from ._unfinished import Unfinished
-from ._wandering import steadied
-from ._weighed import HeldOutRuns, Weighed
+from .advice.detection_limits import Silence, Smallest, detectable, naturally_detectable
+from .advice.next_test import Leading
+from .channels.clipping import limited
+from .channels.delays import Late, in_time, showing_late, slightly_late
+from .channels.drift import steadied
+from .evidence.fitted import Trial
+from .evidence.measured import HeldOutRuns, Weighed
+from .evidence.missing_force import residual
+from .evidence.setup import Problem
+from .evidence.split import HeldOut, split
+from .hypotheses.candidate import Candidate
+from .hypotheses.candidates import chosen_causes
+from .report.assemble import Reached, Tested, assemble
+from .report.unfinished import Unfinished
+from .search.rounds import Searched
+from .search.steps import Progress, Steps
+from .search.study import Study
 from .verdict.judge import judge
 
 _ROUNDS = 3
@@ -150,12 +152,8 @@ def _diagnosed(
     lacking = refitted.structure if term is None else winner.structure.without(term)
     at = term.at if term is not None and term.at in lacking.links else None
     missing = residual(lacking, steadied(first), fitted, at)
-    silence = Silence(tried.given, refitted, judged)
     steps.next("what would have been seen")
-    if decision.verdict in ("consistent", "undecided"):  # silence is worth what would have been heard
-        seen = naturally_detectable(every, silence)
-    else:
-        seen = detectable(tried.trials, silence)
+    seen = _would_have_been_seen(decision.verdict, every, tried, judged)
     if decision.verdict != "consistent":
         extended = showing_late(extended, late)
     unfinished = Unfinished.of(chosen, tried, limit, cut=not decision.finished, pairs=study.pairs)
@@ -164,6 +162,15 @@ def _diagnosed(
     steps.end()
     reached = Reached(decision, winner, term, weighed.evidence)
     return assemble(reached, clipped, refitted, tested, judged, extended, missing, gain, runs, leading)
+
+
+def _would_have_been_seen(verdict: str, every: list[Candidate], found: Searched, problem: Problem) -> list[Smallest]:
+    """The smallest effects that would have shown: of every candidate where none was named, since silence is worth what
+    would have been heard."""
+    silence = Silence(found.given, found.refitted, problem)
+    if verdict in ("consistent", "undecided"):
+        return naturally_detectable(every, silence)
+    return detectable(found.trials, silence)
 
 
 def _looked_into(

@@ -8,20 +8,11 @@ from typing import Any
 
 import jax
 
+from .._result import Estimate
 from ..structures import Structure, causes
-from ._gain import Gain
-from ._next import Leading, Proposal, proposals
+from .advice.next_test import Leading, Proposal, proposals
+from .evidence.free_runs import Gain
 from .verdict.decision import Decision
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A value with its 95 % interval and unit."""
-
-    value: float
-    low: float
-    high: float
-    unit: str
 
 
 @dataclass(frozen=True)

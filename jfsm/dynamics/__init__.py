@@ -1,8 +1,7 @@
-"""What it does: structures lowered to arrays, and their free runs."""
+"""What it does: free runs of a structure, and the analysis of its motions."""
 
 from ._backbone import Backbone as Backbone
 from ._backbone import backbone as backbone
-from ._drive import Reconstruction as Reconstruction
 from ._fixed_points import FixedPoint as FixedPoint
 from ._fixed_points import fixed_points as fixed_points
 from ._forced_response import ForcedResponse as ForcedResponse
@@ -13,6 +12,5 @@ from ._linearise import Linearisation as Linearisation
 from ._linearise import linearise as linearise
 from ._many import Responses as Responses
 from ._many import simulate_many as simulate_many
-from ._plant import lower as lower
 from ._simulate import Response as Response
 from ._simulate import simulate as simulate

@@ -9,11 +9,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from .._types import as_array
+from ..plant import Plant, free_acceleration, inverse_mass, lower, smooth_force
 from ..structures import AbstractFriction, AbstractTerm, Structure
 from ..surrogates import HermiteTable
-from ._forces import smooth_force
-from ._plant import Plant, lower
-from ._stepper import free_acceleration, inverse_mass
 
 _TIMES = np.concatenate([[0.0], np.geomspace(1e-3, 1e7, 40), -np.geomspace(1e-3, 1e7, 40)])
 """Instants [s] at which a force that does not depend on time must be the same to the last bit."""

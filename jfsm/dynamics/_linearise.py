@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float, Inexact
 
 from .._types import as_array, require_x64
+from ..plant import state_matrix
 from ..structures import Structure
 from ._field import Field, autonomous_field
 
@@ -106,12 +107,6 @@ def linearise_field(system: Field, state: np.ndarray) -> Linearisation:
         stiffness=stiffness,
         damping=damping,
     )
-
-
-def state_matrix(stiffness: np.ndarray, damping: np.ndarray) -> np.ndarray:
-    """Matrix of y' = matrix y, y = (x, v), from stiffness and damping (..., dof, dof) over the mass."""
-    one = np.broadcast_to(np.eye(stiffness.shape[-1]), stiffness.shape)
-    return np.block([[np.zeros_like(stiffness), one], [-stiffness, -damping]])
 
 
 def tangent(system: Field, state: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -13,23 +13,28 @@ from jaxtyping import Float
 from .._programs import programs_kept
 from .._threads import side_by_side
 from .._types import as_array, require_x64
-from ..records import Record
-from ..structures import MapTerm, Structure
-from ._drive import Reconstruction
-from ._excitation import (
+from ..plant import (
+    Grid,
+    InterpolatedInput,
+    Plant,
+    Reconstruction,
+    alone,
     bucket,
+    check_pair,
     excitation,
     force_limits,
+    free_run,
+    lower,
     measured_force,
     probes,
     relaxed_jacobian,
+    state_matrix,
     substeps_for,
     typical_size,
 )
-from ._grid import Fine, free_run
-from ._linearise import state_matrix
-from ._plant import Grid, Plant, alone, lower
-from ._simulate import check_pair, escapes, finer, motion_bound, with_tables
+from ..records import Record
+from ..structures import MapTerm, Structure
+from ._simulate import escapes, finer, motion_bound, with_tables
 
 _LANES = (1, 8, 64)
 """Runs that go side by side in one call of the program; beyond 64 their states leave the processor's cache."""
@@ -115,7 +120,7 @@ def simulate_many(
     steps = substeps or finer(max(substeps_for(structure, record.dt, size) for structure in asked))
     plants = _lowered(structures, Grid(record.dt, steps))
     force = measured_force(record, dof, force_limits(structures[0]))
-    fine = excitation(record, dof, steps, reconstruction, length=bucket(len(record)), force=force)
+    inputs = excitation(record, dof, steps, reconstruction, length=bucket(len(record)), force=force)
     x, v, a = (np.empty((runs, len(record), dof)) for _ in range(3))
 
     def together(begin: int) -> None:
@@ -123,11 +128,11 @@ def simulate_many(
         lanes = np.resize(index, next(size for size in _LANES if size >= index.size))
         plant = _taken(plants, lanes % len(structures))
         start = (jnp.asarray(q[lanes % len(q)]) for q in (x0, v0))
-        for out, values in zip((x, v, a), _runs(plant, fine, *start), strict=True):
+        for out, values in zip((x, v, a), _runs(plant, inputs, *start), strict=True):
             out[index] = np.asarray(values)[: index.size, : len(record)]
 
     list(side_by_side(together, range(0, runs, _LANES[-1])))
-    escaped = escapes(motion_bound(plants, fine, record, x0, x), x, v)
+    escaped = escapes(motion_bound(plants, inputs, record, x0, x), x, v)
     for k in np.flatnonzero(escaped < len(record)):
         for out in (x, v, a):
             out[k, escaped[k] :] = out[k, max(escaped[k] - 1, 0)]
@@ -217,6 +222,6 @@ def _jacobians(plants: Plant, x, v):
 
 
 @eqx.filter_jit
-def _runs(plants: Plant, fine: Fine, x0, v0):
+def _runs(plants: Plant, inputs: InterpolatedInput, x0, v0):
     axes = _axes(plants)
-    return jax.vmap(lambda plant, x0, v0: free_run(plant, fine, x0, v0), in_axes=(axes, 0, 0))(plants, x0, v0)
+    return jax.vmap(lambda plant, x0, v0: free_run(plant, inputs, x0, v0), in_axes=(axes, 0, 0))(plants, x0, v0)

@@ -6,10 +6,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._forces import hidden_rate, hidden_start, smooth_force
-from ._grid import Fine, punctual, true_force
-from ._plant import Plant
-from ._stepper import inverse_mass
+from ..plant import (
+    InterpolatedInput,
+    Plant,
+    hidden_rate,
+    hidden_start,
+    inverse_mass,
+    smooth_force,
+    true_force,
+    undelayed,
+)
 
 STEPS_OF_DRIVE = 16
 """Steps per sample at least on which the drive is given. Between the half steps of 16 a sine with two samples a period
@@ -22,21 +28,23 @@ _SCALES = 1.0 / np.array([np.prod((k - _NODES)[_OTHERS[i]]) for i, k in enumerat
 
 
 @eqx.filter_jit
-def run_reference(plant: Plant, fine: Fine, x0, v0, tolerance, scale):
+def run_reference(plant: Plant, inputs: InterpolatedInput, x0, v0, tolerance, scale):
     """Displacement and velocity at every sample, each (n, dof), the hidden states, and whether the end was reached.
 
     `scale` is the size of the motion that `tolerance` is relative to. Step control finds knots and jumps by itself.
     Between its half steps the drive is the quintic through the six nearest of the same sample.
     """
     minv = inverse_mass(plant)
-    fine = punctual(plant, fine)
-    n, halves, dof = fine.force.shape
-    forces = true_force(plant, fine.force.reshape(n * halves, -1), fine.base.reshape(-1)).reshape(fine.force.shape)
-    drive = jnp.concatenate([forces, fine.base[..., None]], 2)
+    inputs = undelayed(plant, inputs)
+    n, halves, dof = inputs.force.shape
+    forces = true_force(plant, inputs.force.reshape(n * halves, -1), inputs.base.reshape(-1)).reshape(
+        inputs.force.shape
+    )
+    drive = jnp.concatenate([forces, inputs.base[..., None]], 2)
 
     def slope(t, state, _):
         x, v, z = state
-        place = jnp.clip((t - fine.time[0]) / fine.step, 0.0, n - 1e-9)
+        place = jnp.clip((t - inputs.time[0]) / inputs.step, 0.0, n - 1e-9)
         k = jnp.floor(place).astype(int)
         inner = (place - k) * (halves - 1)
         first = jnp.clip(jnp.floor(inner).astype(int) - 2, 0, halves - 6)
@@ -48,11 +56,11 @@ def run_reference(plant: Plant, fine: Fine, x0, v0, tolerance, scale):
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(slope),
         diffrax.Tsit5(),
-        t0=fine.time[0],
-        t1=fine.time[-1],
-        dt0=fine.step / fine.substeps,
+        t0=inputs.time[0],
+        t1=inputs.time[-1],
+        dt0=inputs.step / inputs.substeps,
         y0=(x0, v0, hidden_start(plant, x0, v0)),
-        saveat=diffrax.SaveAt(ts=fine.time),
+        saveat=diffrax.SaveAt(ts=inputs.time),
         stepsize_controller=diffrax.PIDController(rtol=tolerance, atol=tolerance * scale),
         max_steps=_STEPS_PER_SAMPLE * n,
         throw=False,
@@ -68,18 +76,18 @@ def _quintic_weights(place, xp=jnp):
     return xp.prod(distances, axis=1) * _SCALES
 
 
-def coarser(fine: Fine) -> Fine:
+def coarser(inputs: InterpolatedInput) -> InterpolatedInput:
     """The same drive known on every second half step only; in between the quintic through the six nearest of these.
 
-    Where the reconstruction is smooth it is off by 64 times as much as `fine` itself.
+    Where the reconstruction is smooth it is off by 64 times as much as `inputs` itself.
     """
-    halves = fine.force.shape[1]
+    halves = inputs.force.shape[1]
     few = np.arange(0, halves, 2)
     thin = np.zeros((halves, halves))
     thin[few, few] = 1.0
     for node in range(1, halves, 2):
         first = min(max(node // 2 - 2, 0), few.size - 6)
         thin[node, few[first : first + 6]] = _quintic_weights(node / 2 - first, np)
-    force = np.einsum("ij,njd->nid", thin, np.asarray(fine.force), optimize=True)
-    base = np.asarray(fine.base) @ thin.T
-    return Fine(jnp.asarray(force), jnp.asarray(base), fine.time, fine.step)
+    force = np.einsum("ij,njd->nid", thin, np.asarray(inputs.force), optimize=True)
+    base = np.asarray(inputs.base) @ thin.T
+    return InterpolatedInput(jnp.asarray(force), jnp.asarray(base), inputs.time, inputs.step)

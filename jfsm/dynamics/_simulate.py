@@ -14,6 +14,33 @@ from scipy.interpolate import CubicSpline
 from .._programs import programs_kept
 from .._result import Result
 from .._types import HostArray, as_numbers, is_traced, known, require_x64
+from ..plant import (
+    Grid,
+    InterpolatedInput,
+    Plant,
+    Reconstruction,
+    alone,
+    bucket,
+    check_pair,
+    excitation,
+    force_limits,
+    force_needed,
+    free_acceleration,
+    imposed_motion,
+    imposed_substeps,
+    inverse_mass,
+    lower,
+    measured_force,
+    observation_of,
+    run_again,
+    run_grid,
+    run_strided,
+    starting_state,
+    substeps_for,
+    true_force,
+    typical_size,
+    undelayed,
+)
 from ..records import Record
 from ..structures import (
     AbstractFriction,
@@ -30,15 +57,7 @@ from ..structures import (
 )
 from ..surrogates import AbstractForceStateMap, tabulate
 from ._agreement import Agreement, agreement
-from ._drive import Reconstruction
-from ._excitation import bucket, excitation, force_limits, measured_force, substeps_for, typical_size
-from ._grid import Fine, punctual, run_again, run_grid, run_strided, true_force
-from ._imposed import imposed_motion, imposed_substeps
-from ._needed import force_needed
-from ._plant import Grid, Plant, alone, lower, readout
 from ._reference import STEPS_OF_DRIVE, coarser, run_reference
-from ._start import starting_state
-from ._stepper import free_acceleration, inverse_mass
 
 Solver = Literal["reference", "grid"]
 
@@ -233,9 +252,9 @@ def _traced_response(model: Structure, record: Record, initial_state: Any, force
     every = chosen.substeps if len(plant.delayed) else 1
     if force is not None:
         samples = _by_dof(force, record, model.dof)
-    fine = excitation(record, model.dof, chosen.substeps, reconstruction, length=bucket(len(record)), force=samples)
+    inputs = excitation(record, model.dof, chosen.substeps, reconstruction, length=bucket(len(record)), force=samples)
     start = now if initial_state is None else tuple(jnp.atleast_1d(jnp.asarray(q, dtype=float)) for q in initial_state)
-    x, v, a = run_again(plant, fine.by_steps() if every > 1 else fine, *(jnp.asarray(q) for q in start))
+    x, v, a = run_again(plant, inputs.by_steps() if every > 1 else inputs, *(jnp.asarray(q) for q in start))
     shown = slice(0, len(record) * every, every)
     return _response(model, record, chosen._replace(motion=(x[shown], v[shown], a[shown])))
 
@@ -257,15 +276,15 @@ def _free_run(
     sticks = any(isinstance(t, AbstractFriction) for t in model.terms)
     own_scheme = sticks or any(t.delay is not None for t in model.terms)
 
-    def drive(substeps: int) -> Fine:
+    def drive(substeps: int) -> InterpolatedInput:
         return excitation(record, model.dof, substeps, reconstruction, length=bucket(len(record)), force=force)
 
     substeps = finer(substeps_for(model, record.dt, typical_size(record)))
     # The grid run is cheap, and tells where an unstable motion leaves, before any step control meets it.
     better = _grid_run(model, record, drive(substeps), start)
     if better.stop is None and solver == "reference" and not own_scheme:
-        fine = drive(max(substeps, STEPS_OF_DRIVE))
-        found = _controlled_run(model, record, fine, start, better, tolerance)
+        inputs = drive(max(substeps, STEPS_OF_DRIVE))
+        found = _controlled_run(model, record, inputs, start, better, tolerance)
         if found is not None:
             return found._replace(substeps=substeps)
     coarse = _grid_run(model, record, drive(substeps), start, stride=2)
@@ -284,21 +303,21 @@ class _GridRun(NamedTuple):
     """Displacement [m] that is usual for what drives."""
 
 
-def _grid_run(model: Structure, record: Record, fine: Fine, start: tuple, stride: int = 1) -> _GridRun:
+def _grid_run(model: Structure, record: Record, inputs: InterpolatedInput, start: tuple, stride: int = 1) -> _GridRun:
     """A run in fixed steps, or in those `stride` times as long: both by one program."""
-    plant, n, every = lower(model, grid=Grid(record.dt, fine.substeps // stride)), len(record), 1
+    plant, n, every = lower(model, grid=Grid(record.dt, inputs.substeps // stride)), len(record), 1
     begin = tuple(jnp.asarray(q) for q in start)
     if len(plant.delayed):
         # What answers the past remembers the motion once per sample of the drive, so here every step is one.
-        every, length = fine.substeps // stride, fine.force.shape[0] * fine.substeps
-        reach = lower(model, grid=_steps_of(record.dt, fine.substeps)).reach
-        motion = run_grid(replace(plant, reach=reach), fine.by_steps(stride, length), *begin)
+        every, length = inputs.substeps // stride, inputs.force.shape[0] * inputs.substeps
+        reach = lower(model, grid=_steps_of(record.dt, inputs.substeps)).reach
+        motion = run_grid(replace(plant, reach=reach), inputs.by_steps(stride, length), *begin)
     else:
-        motion = run_strided(plant, fine, jnp.asarray(stride), *begin)
+        motion = run_strided(plant, inputs, jnp.asarray(stride), *begin)
     x, v, a = (np.asarray(q)[: n * every : every] for q in motion)
-    bound = motion_bound(plant, fine, record, np.asarray(start[0]), x)
+    bound = motion_bound(plant, inputs, record, np.asarray(start[0]), x)
     escape = int(escapes(bound, x, v))
-    return _GridRun((x, v, a), escape if escape < n else None, fine.substeps // stride, float(bound) / _BOUND)
+    return _GridRun((x, v, a), escape if escape < n else None, inputs.substeps // stride, float(bound) / _BOUND)
 
 
 def _judged(run: _GridRun, coarse: _GridRun, ratio: int) -> _Run:
@@ -311,19 +330,19 @@ def _judged(run: _GridRun, coarse: _GridRun, ratio: int) -> _Run:
 
 
 def _controlled_run(
-    model: Structure, record: Record, fine: Fine, start: tuple, on_grid: _GridRun, tolerance: float
+    model: Structure, record: Record, inputs: InterpolatedInput, start: tuple, on_grid: _GridRun, tolerance: float
 ) -> _Run | None:
     """A run with step control, sharpened once where it is not good enough; None if step control did not get through."""
     exact, n = lower(model), len(record)
     scale = jnp.maximum(jnp.std(jnp.asarray(on_grid.motion[0])), 1e-30)
-    (x0, v0), coarse, found = (jnp.asarray(q) for q in start), coarser(fine), None
+    (x0, v0), coarse, found = (jnp.asarray(q) for q in start), coarser(inputs), None
     for tight in (tolerance, max(tolerance / _LOOSER, _TIGHTEST)):
-        run = run_reference(exact, fine, x0, v0, jnp.asarray(tight), scale)
+        run = run_reference(exact, inputs, x0, v0, jnp.asarray(tight), scale)
         loose = run_reference(exact, coarse, x0, v0, jnp.asarray(min(tight * _LOOSER, 0.1)), scale)
         if not bool(run[-1]):
             break
         x, v = (np.asarray(q)[:n] for q in run[:2])
-        a = np.asarray(_accelerations(exact, fine, *run[:-1]))[:n]
+        a = np.asarray(_accelerations(exact, inputs, *run[:-1]))[:n]
         near = agreement(x, np.asarray(loose[0])[:n], _LOOSE_SHARE, on_grid.usual)
         found = _Run((x, v, a), None, "reference", on_grid.substeps, near)
         if near.within(_WANTED, x, on_grid.usual):
@@ -423,43 +442,22 @@ def _imposed_response(model: Structure, record: Record) -> Response:
     plain = [s for s in model.sensors if not isinstance(s, ForceGain | ForceDelay)]
     structure = Structure(model.mass, model.terms, plain, model.trust)
     plant = lower(structure, channels, grid=Grid(record.dt, substeps))
-    force = force_needed(plant, readout(channels, model.dof), path.imposed(substeps, bucket(len(record))))
+    force = force_needed(plant, observation_of(channels, model.dof), path.imposed(substeps, bucket(len(record))))
     return Response(
         record.time, *path.motion(record.time), Result.successful, None, "grid", model.sensors,
         np.asarray(force)[: len(record)],
     )  # fmt: skip
 
 
-def check_pair(model: Structure, record: Record, *, imposed: bool = False) -> None:
-    """Refuse a record and a structure that do not belong together; `imposed` motions only where they are understood."""
-    if len(record) < 2:
-        raise ValueError(f"`record` must hold at least 2 samples; it has {len(record)}.")
-    if record.dofs > model.dof:
-        raise ValueError(f"`record` names degree of freedom {record.dofs}; the structure has {model.dof}.")
-    if record.drive == "motion":
-        if imposed:
-            return
-        raise ValueError(
-            '`record` has drive="motion"; here a force or a moving base must drive. `simulate`, `fit` and `diagnose` '
-            'take imposed motions; if the force drives the structure, make the record with drive="force".'
-        )
-    masses = np.asarray(known(model.mass, "`mass`"))
-    if masses.ndim == 1 and np.any(masses == 0):
-        raise ValueError(
-            f"`mass` must be positive for the structure to move; got {masses.tolist()}. "
-            'A mass of 0 is for imposed motion only: make the record with drive="motion" if that is what it is.'
-        )
-
-
 @eqx.filter_jit
-def _accelerations(plant: Plant, fine, x, v, z):
+def _accelerations(plant: Plant, inputs, x, v, z):
     """Accelerations (n, dof) along a motion."""
-    minv, fine = inverse_mass(plant), punctual(plant, fine)
+    minv, inputs = inverse_mass(plant), undelayed(plant, inputs)
 
     def one(force, base, time, x, v, z):
         return free_acceleration(plant, minv, x, v, z, true_force(plant, force[:1], base[:1])[0], time)
 
-    return jax.vmap(one)(fine.force, fine.base, fine.time, x, v, z)
+    return jax.vmap(one)(inputs.force, inputs.base, inputs.time, x, v, z)
 
 
 def finer(substeps: int) -> int:
@@ -467,7 +465,7 @@ def finer(substeps: int) -> int:
     return max(min(_FINER * substeps, _MOST_FINER), 2 * substeps)
 
 
-def motion_bound(plant: Plant, fine: Fine, record: Record, x0: np.ndarray, x: np.ndarray) -> np.ndarray:
+def motion_bound(plant: Plant, inputs: InterpolatedInput, record: Record, x0: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Displacement beyond which a run has escaped: far more than was measured, could be driven, or is usual in it.
 
     The plant's matrices, `x0` (..., dof) and `x` (..., n, dof) may have leading axes, one bound for each.
@@ -476,7 +474,7 @@ def motion_bound(plant: Plant, fine: Fine, record: Record, x0: np.ndarray, x: np
         (np.max(np.abs(y)) for (kind, _), y in record.responses.items() if kind == "displacement"), default=0
     )
     stiffness, mass = (np.max(np.abs(np.asarray(q)), axis=(-2, -1)) for q in (plant.stiffness, plant.mass))
-    driving = np.max(np.abs(np.asarray(fine.force))) + mass * np.max(np.abs(np.asarray(fine.base)))
+    driving = np.max(np.abs(np.asarray(inputs.force))) + mass * np.max(np.abs(np.asarray(inputs.base)))
     static = driving / np.where(stiffness > 0, stiffness, mass / record.duration**2)
     # With nothing else to compare with, the median of the run has to do.
     own = np.nanmedian(np.abs(np.where(np.isfinite(x), x, np.nan)), axis=(-2, -1))

@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 
 from .._programs import programs_kept
 from .._types import as_scalar, require_x64
-from ..dynamics._excitation import bucket
+from ..plant import bucket
 from ..records import Record, noise_floor
 from ..surrogates import Kriging
 from ..surrogates.kriging.correlations import AbstractCorrelation

@@ -10,15 +10,13 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from .._types import Array
-from ..dynamics._imposed import Imposed
-from ..dynamics._needed import needed
-from ..dynamics._plant import Plant, Readout
+from ..plant import Imposed, Observation, Plant, needed
 from ._filter import Innovations, ProcessNoise, Readings
 
 
 def force_innovations(
     plant: Plant,
-    show: Readout,
+    observation: Observation,
     imposed: Imposed,
     readings: Readings,
     noise: ProcessNoise,
@@ -31,12 +29,12 @@ def force_innovations(
     the mean of its channels'. `doubt` is that of what laws remember at the start, as a share of
     its own size, `noise` the force that is forgiven.
     """
-    found, error, dof = needed(plant, show, imposed, doubt), imposed.error, plant.dof
-    forces = [c for c, kind in enumerate(show.kinds) if kind == "force"]
-    others = jnp.array([float(kind != "force") for kind in show.kinds])
-    mine = show.select * others[:, None]
+    found, error, dof = needed(plant, observation, imposed, doubt), imposed.error, plant.dof
+    forces = [c for c, kind in enumerate(observation.kinds) if kind == "force"]
+    others = jnp.array([float(kind != "force") for kind in observation.kinds])
+    mine = observation.select * others[:, None]
     share = jnp.exp(jnp.sum(mine * log_scale[:, None], 0) / jnp.sum(mine, 0))
-    pick = show.select[jnp.array(forces)]
+    pick = observation.select[jnp.array(forces)]
     rows = jnp.einsum("cf,nfjo,njok->ncjk", pick, found.slopes, error.rows)
     white = (found.besides + jnp.diag(noise.velocity)[None, :]) @ pick.T
     white = white + (readings.variance * jnp.exp(log_scale))[None, jnp.array(forces)]

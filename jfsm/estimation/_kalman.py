@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .._types import Array
+from ._measurement_update import measurement_update
 
 _LEAST_SWELL = 1e-4
 
@@ -59,12 +60,8 @@ def told_by(
     predicted = mean, covariance
     total, readings = jnp.zeros(()), []
     for c in range(seen.shape[0]):
-        row = rows[c]
-        cross = jnp.sum(covariance * row[None, :], 1)
-        spread = jnp.sum(row * cross) + variance[c]
-        error = seen[c] - jnp.sum(row * mean)
-        weight = counted[c] * cross / spread
-        mean, covariance = mean + weight * error, covariance - weight[:, None] * cross[None, :]
+        error = seen[c] - jnp.sum(rows[c] * mean)
+        mean, covariance, spread, weight = measurement_update(mean, covariance, rows[c], error, variance[c], counted[c])
         total = total - 0.5 * counted[c] * (error**2 / spread + jnp.log(2 * jnp.pi * spread))
         readings.append((error, spread, weight))
     error, spread, weight = (jnp.stack(each) for each in zip(*readings, strict=True))

@@ -19,10 +19,7 @@ from jaxtyping import ArrayLike, Bool, Float, Shaped
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from .._types import Array
-from ..dynamics._along import force_along
-from ..dynamics._excitation import bucket
-from ..dynamics._grid import Fine, punctual, shifted
-from ..dynamics._plant import Plant, Readout
+from ..plant import InterpolatedInput, Observation, Plant, bucket, force_along, shifted, undelayed
 from ._kalman import LinearModel, log_likelihood, smoothed, swell_of
 
 _MEMORIES = (0.15, 1.0)
@@ -67,8 +64,8 @@ class _Model(NamedTuple):
 
 def latent_force(
     plant: Plant,
-    show: Readout,
-    fine: Fine,
+    observation: Observation,
+    inputs: InterpolatedInput,
     values: Float[ArrayLike, "n channels"],
     use: Shaped[ArrayLike, "n channels"],
     variance: Float[ArrayLike, " channels"],
@@ -82,7 +79,7 @@ def latent_force(
     ----------
     plant : Plant
         With its sensors' gains, offsets and delays.
-    fine : Fine
+    inputs : InterpolatedInput
         What drives the record, at least as long as the readings.
     values, use : (n, channels) arrays
         Readings, and which of them count.
@@ -90,24 +87,24 @@ def latent_force(
     omega, length : float
         Angular frequency [rad/s] and size of the motion.
     """
-    n, dt = np.shape(values)[0], float(fine.step)
-    padded = min(bucket(n), fine.time.shape[0])  # nothing is read where it is filled up
+    n, dt = np.shape(values)[0], float(inputs.step)
+    padded = min(bucket(n), inputs.time.shape[0])  # nothing is read where it is filled up
     values, use = (np.pad(np.asarray(q), ((0, padded - n), (0, 0))) for q in (values, use))
-    base = np.asarray(fine.base)[:padded]
-    true = (np.asarray(punctual(plant, fine).force)[:padded] - np.asarray(plant.force_offset)) / (
+    base = np.asarray(inputs.base)[:padded]
+    true = (np.asarray(undelayed(plant, inputs).force)[:padded] - np.asarray(plant.force_offset)) / (
         1 + np.asarray(plant.force_gain)
     )
     true = true - base[..., None] * np.asarray(plant.mass).sum(1)
     seen = (values - np.asarray(plant.channel_offset)) / (1 + np.asarray(plant.channel_gain))
     seen, use = _on_time(plant, seen, use, dt)
-    acceleration = np.array([kind == "acceleration" for kind in show.kinds])
+    acceleration = np.array([kind == "acceleration" for kind in observation.kinds])
     seen = seen - base[:, :1] * acceleration
     models = [
         _model(
             plant,
-            show,
+            observation,
             dt,
-            fine.substeps,
+            inputs.substeps,
             tau / omega,
             share * omega**2 * length,
             np.asarray(force_covariance),
@@ -140,7 +137,7 @@ def latent_force(
     mean, std = (np.asarray(out) for out in _smooth(model, *data, swell))
     x, v, r = mean[:, :dof], mean[:, dof : 2 * dof], mean[:, 2 * dof :]
     known = (
-        np.asarray(force_along(plant, jnp.asarray(x), jnp.asarray(v), fine.time[:padded]))
+        np.asarray(force_along(plant, jnp.asarray(x), jnp.asarray(v), inputs.time[:padded]))
         if plant.laws
         else np.zeros_like(x)
     )
@@ -162,7 +159,7 @@ def _on_time(plant: Plant, seen: np.ndarray, use: np.ndarray, dt: float) -> tupl
 
 
 def _model(
-    plant: Plant, show: Readout, dt, substeps, tau, amplitude, force_covariance, variance, omega, length
+    plant: Plant, observation: Observation, dt, substeps, tau, amplitude, force_covariance, variance, omega, length
 ) -> _Model:
     dof = plant.dof
     minv = np.linalg.inv(np.asarray(plant.mass))
@@ -176,12 +173,12 @@ def _model(
     weight = (
         dt / (6 * substeps) * np.array([1.0 if j in (0, nodes - 1) else 4.0 if j % 2 else 2.0 for j in range(nodes)])
     )
-    onward = [np.eye(n)]
+    transitions = [np.eye(n)]
     short = scipy.linalg.expm(rate * dt / (nodes - 1))
     for _ in range(nodes - 1):
-        onward.append(onward[-1] @ short)
-    carried = weight[:, None, None] * (np.array(onward[::-1]) @ gain)
-    step = onward[-1]
+        transitions.append(transitions[-1] @ short)
+    carried = weight[:, None, None] * (np.array(transitions[::-1]) @ gain)
+    step = transitions[-1]
     mass = np.diag(np.asarray(plant.mass))
     noise = np.zeros((n, n))
     noise[dof : 2 * dof, dof : 2 * dof] = minv @ (force_covariance * dt**2) @ minv.T
@@ -192,10 +189,10 @@ def _model(
         "velocity": np.hstack([zero, eye, zero]),
         "acceleration": rate[dof : 2 * dof],
     }
-    select = np.asarray(show.select)
-    rows = np.array([s @ row[kind] for kind, s in zip(show.kinds, select, strict=True)])
+    select = np.asarray(observation.select)
+    rows = np.array([s @ row[kind] for kind, s in zip(observation.kinds, select, strict=True)])
     through = np.array(
-        [s @ minv if kind == "acceleration" else 0 * s for kind, s in zip(show.kinds, select, strict=True)]
+        [s @ minv if kind == "acceleration" else 0 * s for kind, s in zip(observation.kinds, select, strict=True)]
     )
     sizes = np.concatenate([np.full(dof, length), np.full(dof, length * omega), amplitude * mass])
     start = np.diag((_WIDE * sizes) ** 2)

@@ -4,8 +4,8 @@ The covariance of a linear plant does not depend on what is read. So lanes that 
 them or in the zeros of their sensors share its gains, and only their means go through the samples. A covariance that
 has settled is kept, with its gains, while the same channels are read.
 
-The readings of a sample are taken together, by the factors of their covariance. Errors and variances are still those of
-one reading after the other, of which one that is not used tells the later ones nothing.
+A sample's readings are taken one after the other, and what they make of the mean is kept as a matrix: the update of
+every mean at once. A reading that is not used tells the later ones nothing.
 """
 
 from typing import NamedTuple
@@ -16,9 +16,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from .._types import Array
-from ..dynamics._plant import Plant, Readout
-from ..dynamics._stepper import inverse_mass, times
+from ..plant import Observation, Plant, inverse_mass, times
 from ._filter import Assumed, Known, beside, short_transition, transition, zeros_of
+from ._measurement_update import measurement_update
 
 _SETTLED = 1e-12
 """Change of a covariance in a sample, in standard deviations, that is none. What is still to come is that times the
@@ -26,14 +26,14 @@ samples that the filter remembers, thousands at most. Where little stirs the str
 
 
 class Law(NamedTuple):
-    """What is the same at every sample: of the state (x, v, zeros of channels), of its covariance, and of readings.
+    """Constants of every sample: of the state (x, v, zeros of channels), of its covariance, and of readings.
 
-    From a sample to the next the mean is multiplied by `onward` and moved by `push` times the forces on the half steps;
-    the covariance is carried by `spread`, which differs from `onward` where steps are no power of two, and grows by
+    From a sample to the next `transition` multiplies the mean, and `push` times the forces on the half steps moves it.
+    The covariance follows `spread`, which differs from `transition` where steps are no power of two, and grows by
     `added`. Channels show the state by `shown`, the forces by `direct`, the acceleration of the base by `based`.
     """
 
-    onward: Float[Array, "state state"]
+    transition: Float[Array, "state state"]
     push: Float[Array, "halves state dof"]
     spread: Float[Array, "state state"]
     added: Float[Array, "state state"]
@@ -45,25 +45,25 @@ class Law(NamedTuple):
     inertia: Float[Array, " dof"]
 
     @classmethod
-    def of(cls, plant: Plant, assumed: Assumed, show: Readout, dt: Float[Array, ""], substeps: int) -> "Law":
+    def of(cls, plant: Plant, assumed: Assumed, observation: Observation, dt: Float[Array, ""], substeps: int) -> "Law":
         known, minv, dof = Known.of(plant, assumed), inverse_mass(plant), plant.dof
         answer = -jnp.concatenate([minv @ plant.stiffness, minv @ plant.damping], 1)
         rates = jnp.concatenate([jnp.eye(dof, 2 * dof, dof), answer])
         step, push = _runge_kutta(rates, minv, dt / substeps, substeps)
         zeros, gain = zeros_of(assumed), 1.0 + plant.channel_gain
         seen = {"displacement": jnp.eye(dof, 2 * dof), "velocity": jnp.eye(dof, 2 * dof, dof), "acceleration": answer}
-        rows = jnp.stack([row @ seen[kind] for row, kind in zip(show.select, show.kinds, strict=True)])
-        added_to = np.array([[channel == c for channel in zeros] for c in range(len(show.kinds))], float)
-        driven = gain * np.array([kind == "acceleration" for kind in show.kinds], float)
+        rows = jnp.stack([row @ seen[kind] for row, kind in zip(observation.select, observation.kinds, strict=True)])
+        added_to = np.array([[channel == c for channel in zeros] for c in range(len(observation.kinds))], float)
+        driven = gain * np.array([kind == "acceleration" for kind in observation.kinds], float)
         return cls(
-            beside(step, known.onward),
+            beside(step, known.transition),
             jnp.pad(push, ((0, 0), (0, len(zeros)), (0, 0))),
-            beside(transition(rates, dt, substeps), known.onward),
-            beside(known.added, known.stirred),
+            beside(transition(rates, dt, substeps), known.transition),
+            beside(known.added, known.process_noise),
             assumed.begin(),
             jnp.concatenate([gain[:, None] * rows, added_to.reshape(len(rows), len(zeros))], 1),
-            driven[:, None] * (show.select @ minv),
-            driven * jnp.sum(show.select, 1),
+            driven[:, None] * (observation.select @ minv),
+            driven * jnp.sum(observation.select, 1),
             known.variances,
             jnp.sum(plant.mass, 1),
         )
@@ -72,9 +72,9 @@ class Law(NamedTuple):
 def _runge_kutta(rates, minv, step, substeps: int):
     """What the Runge-Kutta steps of a sample make of the state, and of the forces on their half steps."""
     dof, one, exponent = minv.shape[0], jnp.eye(rates.shape[0]), step * rates
-    square, struck = exponent @ exponent, step / 6 * jnp.concatenate([jnp.zeros((dof, dof)), minv])
+    square, by_force = exponent @ exponent, step / 6 * jnp.concatenate([jnp.zeros((dof, dof)), minv])
     first, middle = one + exponent + square / 2 + square @ exponent / 4, 4 * one + 2 * exponent + square / 2
-    nodes = jnp.stack([first @ struck, middle @ struck, struck])
+    nodes = jnp.stack([first @ by_force, middle @ by_force, by_force])
     along = short_transition(exponent)
     whole, after = jax.lax.scan(lambda power, _: (along @ power, power), one, length=substeps)
     pushes = after[::-1, None] @ nodes[None]  # of each step, by what the steps after it make of it
@@ -112,7 +112,7 @@ def follow(
     `whose` law each lane obeys, how far each sample `moved` it, and what it `read` besides what the state shows.
     """
     again = jnp.concatenate([jnp.zeros(1, bool), jnp.all(use[1:] == use[:-1], 1)])
-    sees = jnp.concatenate([laws.shown, laws.onward], 1)[whose]
+    sees = jnp.concatenate([laws.shown, laws.transition], 1)[whose]
     channels = use.shape[1]
 
     def move(k, mean, gains: Float[Array, "lanes out channels"]):
@@ -148,7 +148,7 @@ def follow(
     def both(carry: _Carry) -> _Carry:
         return keep(jax.lax.while_loop(lambda now: (now.k < count) & ~now.settled, learn, carry))
 
-    (n, lanes, _), (many, size) = read.shape, laws.onward.shape[:2]
+    (n, lanes, _), (many, size) = read.shape, laws.transition.shape[:2]
     nothing = Errors(jnp.zeros((n, lanes, channels)), jnp.ones((n, many, channels)))
     begin = _Carry(
         jnp.zeros((), count.dtype), course, nothing, jnp.zeros((many, channels + size, channels)), jnp.zeros((), bool)
@@ -171,16 +171,22 @@ def _learned(law: Law, covariance, use):
     """Gains (channels + state, channels), variances, and the covariance a sample later.
 
     Of differences between readings and what was predicted before the sample, gains make those of one reading after the
-    other, and below what all used ones add to the state a sample later.
+    other, and below what all used ones add to the state a sample later. The loop over channels keeps programs small.
     """
-    cross = covariance @ law.shown.T
-    between = law.shown @ cross + jnp.diag(law.noise)
-    own, used = jnp.diagonal(between), use[None, :]
-    root = jnp.linalg.cholesky(jnp.where(jnp.eye(use.size, dtype=bool), between, between * use[:, None] * used))
-    inverse = jax.scipy.linalg.solve_triangular(root, jnp.eye(use.size), lower=True)
-    of_readings, of_state = jnp.tril(between * used @ inverse.T, -1), cross * used @ inverse.T
-    apart = jnp.eye(use.size) - of_readings @ inverse
-    ahead = law.onward @ (of_state @ inverse * used)
-    updated = covariance - of_state @ of_state.T
+    channels, size = law.shown.shape
+
+    def read(known, channel):
+        moved, covariance = known
+        row, of_reading, noise, counted = channel
+        error = of_reading - jnp.sum(row[:, None] * moved, 0)
+
+        def update(mean, error):
+            return tuple(measurement_update(mean, covariance, row, error, noise, counted))
+
+        moved, updated, variance, _ = jax.vmap(update, (1, 0), (1, None, None, None))(moved, error)
+        return (moved, updated), (error, variance)
+
+    each = law.shown, jnp.eye(channels), law.noise, use
+    (moved, updated), (apart, variance) = jax.lax.scan(read, (jnp.zeros((size, channels)), covariance), each)
     after = law.spread @ updated @ law.spread.T + law.added
-    return jnp.concatenate([apart, ahead]), own - jnp.sum(of_readings**2, 1), after
+    return jnp.concatenate([apart, law.transition @ moved]), variance, after

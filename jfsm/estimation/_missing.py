@@ -5,8 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..dynamics._along import force_along
-from ..dynamics._plant import Plant
+from ..plant import Plant, force_along
 
 
 def less_known(

@@ -15,9 +15,7 @@ from jaxtyping import Float
 
 from .._programs import programs_kept
 from .._types import require_x64
-from ..dynamics import lower
-from ..dynamics._plant import direction
-from ..dynamics._simulate import check_pair
+from ..plant import check_pair, direction, lower
 from ..records import Record
 from ..structures import LinearDamping, LinearStiffness, Structure
 from ._learning import Learned, learned, smoothed

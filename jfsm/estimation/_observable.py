@@ -8,9 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..dynamics import lower
-from ..dynamics._linearise import state_matrix
-from ..dynamics._plant import direction
+from ..plant import direction, lower, state_matrix
 from ..structures import Structure
 
 Channel = tuple[str, int]

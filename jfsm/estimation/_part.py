@@ -6,9 +6,7 @@ from dataclasses import dataclass
 import jax.numpy as jnp
 import numpy as np
 
-from ..dynamics import lower
-from ..dynamics._excitation import bucket, fastest_mode, measured_force
-from ..dynamics._plant import Plant, direction
+from ..plant import Plant, bucket, direction, fastest_mode, lower, measured_force
 from ..records import Record, clipped, noise_floor, spikes
 from ..structures import Structure
 from ._observable import Place, told_apart

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from .._programs import programs_kept
 from .._types import as_scalar, require_x64
-from ..dynamics._plant import direction
+from ..plant import direction
 from ..records import Record
 from ..structures import Structure
 from ._motion import estimate_motion

@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ..dynamics._excitation import force_limits, measured_force
-from ..dynamics._plant import Channel
+from ..plant import Channel, force_limits, measured_force
 from ..records import NoiseFloor, Record, bridged, clipped, declipped, defects, noise_floor, spikes, tones
 from ..structures import Structure
 

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from ..dynamics._grid import Fine
+from ..plant import InterpolatedInput, cubic_weights
 
 
 def between_samples(
@@ -17,7 +17,7 @@ def between_samples(
     return begin + share * (end - begin)
 
 
-def punctual_force(
+def undelayed_force(
     force: Float[np.ndarray, "n halves dof"], delay: Float[np.ndarray, " dof"]
 ) -> Float[np.ndarray, "n halves dof"]:
     """Force (n, halves, dof) with the delays of its sensors undone, in samples: that of t is what is read later."""
@@ -27,12 +27,12 @@ def punctual_force(
     return later[np.arange(n)[:, None] * (halves - 1) + np.arange(halves)[None, :]]
 
 
-def forces_before(fine: Fine, tau: float) -> Float[np.ndarray, "n 5 drives"]:
+def forces_before(inputs: InterpolatedInput, tau: float) -> Float[np.ndarray, "n 5 drives"]:
     """Forces, and last the acceleration of the base, (n, 5, dof + 1), from each sample back to tau earlier."""
-    force, base = np.asarray(fine.force), np.asarray(fine.base)
+    force, base = np.asarray(inputs.force), np.asarray(inputs.base)
     n, halves, dof = force.shape
     flat = _in_a_row(np.concatenate([force, base[..., None]], 2))
-    places = -tau / float(fine.step) * (halves - 1) * np.linspace(0.0, 1.0, 5)
+    places = -tau / float(inputs.step) * (halves - 1) * np.linspace(0.0, 1.0, 5)
     earlier = [[_shifted(flat[:, j], place) for place in places] for j in range(dof + 1)]
     return np.array(earlier).transpose(2, 1, 0)[: n * (halves - 1) : halves - 1]
 
@@ -45,13 +45,7 @@ def _in_a_row(values: np.ndarray) -> np.ndarray:
 def _shifted(values: np.ndarray, places: float) -> np.ndarray:
     """Values so many places further on, by the cubic through four neighbours."""
     whole = int(np.floor(places))
-    s = places - whole
-    weights = (
-        -s * (s - 1) * (s - 2) / 6,
-        (s + 1) * (s - 1) * (s - 2) / 2,
-        -(s + 1) * s * (s - 2) / 2,
-        (s + 1) * s * (s - 1) / 6,
-    )
+    weights = cubic_weights(places - whole)
     index, last = np.arange(values.size) + whole, values.size - 1
     near = np.stack([values[np.clip(index + k, 0, last)] for k in (-1, 0, 1, 2)])
     return np.asarray(weights) @ near

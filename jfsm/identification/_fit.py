@@ -11,7 +11,7 @@ from .._programs import programs_kept
 from .._result import Result
 from .._threads import side_by_side
 from .._types import require_x64
-from ..dynamics import Reconstruction
+from ..plant import Reconstruction
 from ..records import Record
 from ..structures import Offset, Structure, is_offset
 from ._maximise import Maximum, approach, finish

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .._types import Array
-from ..dynamics._plant import Channel, Plant, numbers_of
+from ..plant import Channel, Plant, numbers_of
 from ..structures import Structure
 
 _PARTS = (

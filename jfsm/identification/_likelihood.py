@@ -21,13 +21,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Shaped
 
 from .._types import Array
-from ..dynamics._grid import Fine, Past
-from ..dynamics._imposed import Imposed
-from ..dynamics._kernel import jit_with_kernels
-from ..dynamics._plant import Plant, Readout
 from ..estimation._filter import Assumed, Innovations, ProcessNoise, Readings, State, Stretch, begun, on_lanes, run
 from ..estimation._imposed import force_innovations
-from ._drive import between_samples, forces_before, punctual_force
+from ..plant import DelayBuffer, Imposed, InterpolatedInput, Observation, Plant, jit_with_kernels
+from ._drive import between_samples, forces_before, undelayed_force
 from ._layout import place_of, with_vector, without_part
 
 SAMPLES = 1024
@@ -169,16 +166,16 @@ class Scene:
     """
 
     plant: Plant
-    show: Readout
-    fine: Fine | Imposed
+    observation: Observation
+    inputs: InterpolatedInput | Imposed
     readings: Readings
     doubt: Any
     stretches: dict[int, Stretch]
 
     @cached_property
     def lowered(self) -> tuple[list[Array], Any]:
-        """Arrays on the device, and what makes plant, noise and readout of them; the drive has the force's delay."""
-        seen = without_part(self.plant, "force_delay"), Noise.of(self.readings, self.doubt), self.show
+        """Arrays on the device, and the tree of plant, noise and observation; the drive has the force's delay."""
+        seen = without_part(self.plant, "force_delay"), Noise.of(self.readings, self.doubt), self.observation
         leaves, static = jax.tree.flatten(seen)
         return jax.device_put(leaves), static
 
@@ -189,9 +186,9 @@ class Scene:
         dof, slots, reach = plant.dof, len(plant.friction), plant.reach if len(plant.delayed) else 0
         motion, zeros = 2 * dof + plant.hidden, 2 * len(readings.wandering) + len(readings.coloured)
         none: Callable[..., Any] = np.zeros
-        past = Past(none((RUNS, reach, dof)), none((RUNS, reach, dof)), none(RUNS, int))
+        buffer = DelayBuffer(none((RUNS, reach, dof)), none((RUNS, reach, dof)), none(RUNS, int))
         return jax.device_put(State(
-            none((RUNS, dof)), none((RUNS, dof)), none((RUNS, plant.hidden)), none((RUNS, slots), int), past,
+            none((RUNS, dof)), none((RUNS, dof)), none((RUNS, plant.hidden)), none((RUNS, slots), int), buffer,
             none((RUNS, motion + zeros, motion + zeros)), none((RUNS, slots)), none((RUNS, zeros)),
         ))  # fmt: skip
 
@@ -199,9 +196,9 @@ class Scene:
         """Samples from `begin`, as many as a program runs, as the record has them."""
         if begin in self.stretches:
             return self.stretches[begin]
-        fine, readings = self.fine, self.readings
-        assert isinstance(fine, Fine)
-        arrays: Any = fine.force, fine.base, fine.time, readings.values, readings.use
+        inputs, readings = self.inputs, self.readings
+        assert isinstance(inputs, InterpolatedInput)
+        arrays: Any = inputs.force, inputs.base, inputs.time, readings.values, readings.use
         force, base, time, values, use = (_padded(np.asarray(array), begin) for array in arrays)
         lanes: Any = np.broadcast_to(force[:, :, None], (*force.shape[:2], RUNS, force.shape[2]))
         before: Any = np.zeros((SAMPLES, RUNS, 0, 5, force.shape[2] + 1))
@@ -213,7 +210,7 @@ class Scene:
 
 def innovations_of(scene: Scene, runs: Runs, count: int) -> Innovations:
     """Innovations (lanes, count, channels) of all lanes on the first `count` samples."""
-    along = _along_motion if isinstance(scene.fine, Imposed) else _filtered
+    along = _along_motion if isinstance(scene.inputs, Imposed) else _filtered
     shape = len(runs.numbers), count, scene.readings.values.shape[1]
     empty: Callable[..., Any] = np.empty
     found = Innovations(empty(shape), empty(shape), empty(shape))
@@ -227,7 +224,7 @@ def _filtered(scene: Scene, runs: Runs, count: int, found: Innovations) -> None:
     """Put in what a full set of lanes has `found`, or the first of them, a stretch of samples after the other."""
     leaves, static = scene.lowered
     numbers = np.delete(runs.numbers, place_of(scene.plant, "force_delay"), 1)
-    drive, state, dt = _Drive.of(scene, runs, count), scene.nowhere, np.asarray(scene.fine.step)
+    drive, state, dt = _Drive.of(scene, runs, count), scene.nowhere, np.asarray(scene.inputs.step)
     parts = []
     for begin in range(0, count, SAMPLES):
         stretch = drive.put_in(scene.stretch(begin), begin, runs.use)
@@ -284,9 +281,9 @@ def _run(
 ) -> tuple[State, Innovations]:
     """State of all lanes after a stretch, and innovations (n, lanes, channels); the `first` one has no state yet.
 
-    `leaves` and `static` are a plant, `Noise` and a readout.
+    `leaves` and `static` are a plant, `Noise` and an `Observation`.
     """
-    plant, noise, show = jax.tree.unflatten(static, leaves)
+    plant, noise, observation = jax.tree.unflatten(static, leaves)
     floats, fixed = eqx.partition(plant, eqx.is_inexact_array)
 
     def lane(row: Float[Array, " size"]) -> Plant:
@@ -305,7 +302,7 @@ def _run(
         return on_lanes(plants)(one, assumed, x0, v0, force)
 
     state = jax.lax.cond(first, begin, lambda: state)
-    return run(plants, assumed, show, stretch, dt, state, one_kernel=one_kernel)
+    return run(plants, assumed, observation, stretch, dt, state, one_kernel=one_kernel)
 
 
 def tail_of(plant: Plant, numbers, channels: int):
@@ -323,20 +320,20 @@ class _Drive(NamedTuple):
 
     @classmethod
     def of(cls, scene: Scene, runs: Runs, count: int) -> "_Drive":
-        fine: Any = scene.fine
+        inputs: Any = scene.inputs
         plant = scene.plant
         force = before = None
         if plant.force_delay.size:
-            delays = runs.numbers[:, place_of(plant, "force_delay")] / float(fine.step)
-            force = _by_value(delays, lambda tau: punctual_force(np.asarray(fine.force), tau)[:count], 2)
+            delays = runs.numbers[:, place_of(plant, "force_delay")] / float(inputs.step)
+            force = _by_value(delays, lambda tau: undelayed_force(np.asarray(inputs.force), tau)[:count], 2)
         if runs.push is not None:
-            halves = fine.force.shape[1]
+            halves = inputs.force.shape[1]
             pushed = np.moveaxis(between_samples(runs.push, halves, count), 0, 2)
-            force = pushed + (np.asarray(fine.force)[:count, :, None] if force is None else force)
+            force = pushed + (np.asarray(inputs.force)[:count, :, None] if force is None else force)
         if plant.channel_delay.size:
             late = runs.numbers[:, place_of(plant, "channel_delay")]
             before = np.stack(
-                [_by_value(each, lambda tau: forces_before(fine, float(tau))[:count], 1) for each in late.T], 2
+                [_by_value(each, lambda tau: forces_before(inputs, float(tau))[:count], 1) for each in late.T], 2
             )
         return cls(force, before)
 
@@ -359,17 +356,19 @@ def _along_motion(scene: Scene, runs: Runs, count: int, found: Innovations) -> N
         use: Any = np.zeros(seen.use.shape)
         use[: len(runs.use)] = runs.use[: len(use)]
         seen = replace(seen, use=use)
-    along = _along(scene.plant, runs.numbers, scene.show, scene.fine, seen, runs.velocity, scene.doubt)
+    along = _along(scene.plant, runs.numbers, scene.observation, scene.inputs, seen, runs.velocity, scene.doubt)
     for whole, part in zip(found, along, strict=True):
         whole[:] = np.asarray(part)[: len(whole), :count]
 
 
 @eqx.filter_jit
-def _along(plant: Plant, numbers, show: Readout, fine: Any, readings: Readings, velocity, doubt) -> Innovations:
+def _along(
+    plant: Plant, numbers, observation: Observation, inputs: Any, readings: Readings, velocity, doubt
+) -> Innovations:
     log_scale = tail_of(plant, numbers, readings.values.shape[1])[2]
 
     def one(numbers, velocity, log_scale):
         lane = with_vector(plant, numbers)
-        return force_innovations(lane, show, fine, readings, ProcessNoise(velocity), doubt, log_scale)
+        return force_innovations(lane, observation, inputs, readings, ProcessNoise(velocity), doubt, log_scale)
 
     return jax.vmap(one)(numbers, velocity, log_scale)

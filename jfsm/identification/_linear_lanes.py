@@ -13,9 +13,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from .._types import Array
-from ..dynamics._grid import Fine
 from ..estimation._filter import Innovations, few_states
 from ..estimation._linear_filter import Course, Errors, Law, follow
+from ..plant import InterpolatedInput
 from ._drive import between_samples
 from ._layout import place_of, with_vector, without_part
 from ._likelihood import SAMPLES, Runs, Scene, tail_of
@@ -33,7 +33,7 @@ def is_linear(scene: Scene) -> bool:
     plant = scene.plant
     others = plant.friction, plant.memory, plant.delayed, plant.maps, plant.channel_delay, plant.force_delay
     linear = not any(len(part) for part in others) and not np.any(plant.smooth.direction)
-    return linear and isinstance(scene.fine, Fine) and not few_states(plant, scene.readings.zeros)
+    return linear and isinstance(scene.inputs, InterpolatedInput) and not few_states(plant, scene.readings.zeros)
 
 
 def linear_innovations(scene: Scene, runs: Runs, count: int) -> Innovations:
@@ -51,20 +51,20 @@ def linear_innovations(scene: Scene, runs: Runs, count: int) -> Innovations:
 
 def _put(scene: Scene, runs: Runs, count: int, found: Innovations) -> None:
     """Put in what some lanes have `found`, a stretch of samples after the other."""
-    assert isinstance(scene.fine, Fine)
-    fine, values = scene.fine, np.asarray(scene.readings.values)
+    assert isinstance(scene.inputs, InterpolatedInput)
+    inputs, values = scene.inputs, np.asarray(scene.readings.values)
     course: Any = None
     use: Any = np.asarray(scene.readings.use) if runs.use is None else runs.use
     leaves, static = scene.lowered
     first, lanes = _Lanes.of(scene, runs)
-    force: Any = np.asarray(fine.force)[:count, :, None]
+    force: Any = np.asarray(inputs.force)[:count, :, None]
     if runs.push is not None:
         push = _filled(between_samples(runs.push, force.shape[1], count), len(lanes.whose))
         force = force + np.moveaxis(push, 0, 2)
-    law = _law(static, fine.substeps, leaves, runs.numbers[first], runs.velocity[first], np.asarray(fine.step))
+    law = _law(static, inputs.substeps, leaves, runs.numbers[first], runs.velocity[first], np.asarray(inputs.step))
     for begin in range(0, count, SAMPLES):
         end = min(begin + SAMPLES, count)
-        some = force[begin:end], np.asarray(fine.base)[begin:end], values[begin:end], use[begin:end]
+        some = force[begin:end], np.asarray(inputs.base)[begin:end], values[begin:end], use[begin:end]
         samples = _Samples(*(_filled(a, SAMPLES) for a in some))
         course = Course(lanes.start, law.start) if course is None else course
         course, errors = _follow(law, lanes, samples, np.asarray(end - begin), course)
@@ -127,10 +127,12 @@ def _law(
     velocity: Float[Array, "laws dof dof"],
     dt: Float[Array, ""],
 ) -> Law:
-    """The law of every row of numbers; `leaves` and `static` are a plant, `Noise` and a readout."""
-    plant, noise, show = jax.tree.unflatten(static, leaves)
+    """The law of every row of numbers; `leaves` and `static` are a plant, `Noise` and an `Observation`."""
+    plant, noise, observation = jax.tree.unflatten(static, leaves)
     assumed = noise.assumed(tail_of(plant, numbers, noise.variance.size)[2], velocity)
-    return jax.vmap(lambda row, assumed: Law.of(with_vector(plant, row), assumed, show, dt, substeps))(numbers, assumed)
+    return jax.vmap(lambda row, assumed: Law.of(with_vector(plant, row), assumed, observation, dt, substeps))(
+        numbers, assumed
+    )
 
 
 @jax.jit

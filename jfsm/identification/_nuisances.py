@@ -9,20 +9,27 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ..dynamics._drive import Reconstruction
-from ..dynamics._excitation import (
+from ..estimation._filter import ProcessNoise, Readings, Stretch
+from ..plant import (
+    Channel,
+    Imposed,
+    InterpolatedInput,
+    Observation,
+    Path,
+    Reconstruction,
     bucket,
+    check_pair,
     excitation,
     fastest_mode,
+    imposed_motion,
+    imposed_substeps,
+    lower,
+    noise_of,
+    observation_of,
+    starting_state,
     substeps_for,
     typical_size,
 )
-from ..dynamics._grid import Fine
-from ..dynamics._imposed import Imposed, Path, imposed_motion, imposed_substeps, noise_of
-from ..dynamics._plant import Channel, Readout, lower, readout
-from ..dynamics._simulate import check_pair
-from ..dynamics._start import starting_state
-from ..estimation._filter import ProcessNoise, Readings, Stretch
 from ..records import Record, clipped, noise_floor, quantisation_step, spikes
 from ..structures import Structure
 from ._channels import LEAST_NOISE, driving, forces, readings_of, spread_of
@@ -78,7 +85,7 @@ class Nuisances:
     channels : tuple of (kind, degree of freedom)
         Response channels. Where the motion is imposed, all of the record: the readings are those of the force, and the
         motion's channels bring their noise.
-    fine : Fine or Imposed
+    inputs : InterpolatedInput or Imposed
         What is imposed: the force (and the base), or the motion.
     spread : (channels,) array
         Standard deviation of each channel's readings.
@@ -112,8 +119,8 @@ class Nuisances:
 
     record: Record
     channels: tuple[Channel, ...]
-    show: Readout
-    fine: Fine | Imposed
+    observation: Observation
+    inputs: InterpolatedInput | Imposed
     readings: Readings
     noise: ProcessNoise
     driving: DrivingNoise
@@ -145,7 +152,7 @@ class Nuisances:
     @property
     def driven(self) -> bool:
         """Whether a measured force or a moving base drives the record, so that masses show."""
-        return isinstance(self.fine, Fine) and bool(self.fine.force.any() or self.fine.base.any())
+        return isinstance(self.inputs, InterpolatedInput) and bool(self.inputs.force.any() or self.inputs.base.any())
 
     @property
     def drifts(self) -> bool:
@@ -154,9 +161,9 @@ class Nuisances:
 
     def weighs(self, structure: Structure) -> bool:
         """Whether the record tells masses: it is driven, or a motion is imposed whose inertia is more than noise."""
-        if isinstance(self.fine, Fine):
+        if isinstance(self.inputs, InterpolatedInput):
             return self.driven
-        inertia = np.asarray(self.fine.a)[: self.samples] @ _mass(structure)
+        inertia = np.asarray(self.inputs.a)[: self.samples] @ _mass(structure)
         return bool(np.any(np.std(inertia, axis=0) > min(self.floor[self.judged])))
 
     @property
@@ -192,16 +199,16 @@ class Nuisances:
 
     def elastic_force(self, structure: Structure) -> float:
         """Size of the elastic force, or of the measured one where the motion is imposed."""
-        if isinstance(self.fine, Imposed):
+        if isinstance(self.inputs, Imposed):
             return float(np.max(self.spread[self.judged]))
         return float(np.mean(np.diag(_mass(structure)))) * self.omega**2 * self.length
 
     def head(self, until: int) -> tuple[Imposed, Readings]:
         """The motion that is imposed, and the readings, cut to the padded length of the first `until` samples."""
-        assert isinstance(self.fine, Imposed)
-        n, r = min(bucket(until), self.fine.time.shape[0]), self.readings
+        assert isinstance(self.inputs, Imposed)
+        n, r = min(bucket(until), self.inputs.time.shape[0]), self.readings
         if n not in self._heads:
-            self._heads[n] = self.fine.head(n), replace(r, values=r.values[:n], use=r.use[:n], valid=r.valid[:n])
+            self._heads[n] = self.inputs.head(n), replace(r, values=r.values[:n], use=r.use[:n], valid=r.valid[:n])
         return self._heads[n]
 
     def showing(self, values: Float[np.ndarray, "n channels"]) -> "Nuisances":
@@ -258,17 +265,17 @@ class Nuisances:
 
     def resolving(self, structures: Sequence[Structure], least: int = 1) -> "Nuisances":
         """The same record with steps short enough for all of these structures, so many per sample at `least`."""
-        record, fine = self.record, self.fine
+        record, inputs = self.record, self.inputs
         need = max(least, self.steps_for(structures))
-        if need <= fine.substeps:
+        if need <= inputs.substeps:
             return self
         if self.path is not None:
-            return replace(self, fine=self.path.imposed(need, fine.time.shape[0]))
-        assert isinstance(fine, Fine)
-        force, base = (np.asarray(drive)[: self.samples, 0] for drive in (fine.force, fine.base))
-        length, dof = fine.time.shape[0], force.shape[1]
+            return replace(self, inputs=self.path.imposed(need, inputs.time.shape[0]))
+        assert isinstance(inputs, InterpolatedInput)
+        force, base = (np.asarray(drive)[: self.samples, 0] for drive in (inputs.force, inputs.base))
+        length, dof = inputs.time.shape[0], force.shape[1]
         return replace(
-            self, fine=excitation(record, dof, need, self.reconstruction, length=length, force=force, base=base)
+            self, inputs=excitation(record, dof, need, self.reconstruction, length=length, force=force, base=base)
         )
 
 
@@ -307,8 +314,8 @@ def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "
     return Nuisances(
         record=record,
         channels=channels,
-        show=readout(channels, model.dof),
-        fine=_drive(record, model, reconstruction, force.samples, None if base is None else base.samples),
+        observation=observation_of(channels, model.dof),
+        inputs=_drive(record, model, reconstruction, force.samples, None if base is None else base.samples),
         readings=_padded(values, seen.use, noise.shown_by(channels, floor, mass)),
         noise=_disturbance(mass, covariance, omega, length, record.dt),
         driving=noise,
@@ -375,8 +382,8 @@ def _prepare_imposed(record: Record, model: Structure, reconstruction: Reconstru
     return Nuisances(
         record=record,
         channels=channels,
-        show=readout(channels, model.dof),
-        fine=path.imposed(imposed_substeps(model, record.dt, typical_size(record)), bucket(len(record))),
+        observation=observation_of(channels, model.dof),
+        inputs=path.imposed(imposed_substeps(model, record.dt, typical_size(record)), bucket(len(record))),
         readings=_padded(values, use, floor**2),
         noise=ProcessNoise(still),
         driving=DrivingNoise(none, none, 0.0),
@@ -440,7 +447,7 @@ def _start(
 
 def _drive(
     record: Record, model: Structure, reconstruction: Reconstruction, force: np.ndarray, base: np.ndarray | None
-) -> Fine:
+) -> InterpolatedInput:
     """Drive by these samples of force and base, in steps short enough for the model, as long as the padded readings."""
     substeps = substeps_for(model, record.dt, typical_size(record))
     return excitation(record, model.dof, substeps, reconstruction, length=bucket(len(record)), force=force, base=base)

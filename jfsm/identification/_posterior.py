@@ -10,9 +10,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Shaped
 from scipy.optimize import minimize
 
-from ..dynamics._imposed import Imposed
-from ..dynamics._plant import Grid, Plant, hidden_width, numbers_of
 from ..estimation._filter import Innovations
+from ..plant import Grid, Imposed, Plant, hidden_width, numbers_of
 from ..structures import AbstractFriction, ChannelDelay, ForceDelay, Structure
 from ._colour import Colour
 from ._layout import plant_rows, plant_vector
@@ -266,7 +265,7 @@ class Posterior:
         """Plant and parameter map of a start on one record."""
         structure, unknowns = self.hypothesis.structures[lane], self.hypothesis.unknowns[lane]
         mine = np.array([k for k, u in enumerate(unknowns) if u.record in (None, index)], int)
-        grid = Grid(float(nuisances.record.dt), nuisances.fine.substeps)
+        grid = Grid(float(nuisances.record.dt), nuisances.inputs.substeps)
         slots = {"smooth_slots": _slot_bucket(structure), "grid": grid, "rolled": True}
         return _Part.of(structure, [unknowns[k] for k in mine], nuisances, mine, slots)
 
@@ -290,17 +289,17 @@ class _Part:
 
     def scene(self, nuisances: Nuisances, until: int) -> Scene:
         """`of_record` of the record that the part was made for, made once."""
-        key = nuisances.head(until)[0].time.shape[0] if isinstance(nuisances.fine, Imposed) else 0
+        key = nuisances.head(until)[0].time.shape[0] if isinstance(nuisances.inputs, Imposed) else 0
         if key not in self.scenes:
             self.scenes[key] = self.of_record(nuisances, until)
         return self.scenes[key]
 
     def of_record(self, nuisances: Nuisances, until: int) -> Scene:
         """What runs of this plant share on a record, of which the first samples count."""
-        imposed = isinstance(nuisances.fine, Imposed)
-        fine, readings = nuisances.head(until) if imposed else (nuisances.fine, nuisances.readings)
+        imposed = isinstance(nuisances.inputs, Imposed)
+        inputs, readings = nuisances.head(until) if imposed else (nuisances.inputs, nuisances.readings)
         doubt = _doubt(self.plant, nuisances)
-        return Scene(self.plant, nuisances.show, fine, readings, doubt, nuisances.stretches)
+        return Scene(self.plant, nuisances.observation, inputs, readings, doubt, nuisances.stretches)
 
     def numbers(self, theta: np.ndarray) -> np.ndarray:
         """Numbers (runs, size) at values (runs, unknowns)."""
@@ -347,7 +346,7 @@ def _doubt(plant: Plant, nuisances: Nuisances) -> np.ndarray:
     remembers may be off there.
     """
     share = 0.0 if nuisances.record.at_rest else 1.0
-    if isinstance(nuisances.fine, Imposed):
+    if isinstance(nuisances.inputs, Imposed):
         return np.asarray(share)
     length, speed = nuisances.length, nuisances.length * nuisances.omega
     known = _KNOWN_START * np.repeat([length, speed], plant.mass.shape[-1])
@@ -366,9 +365,9 @@ def _slot_bucket(structure: Structure) -> int:
 
 def slackened(nuisances: Nuisances, share: float) -> Float[np.ndarray, "dof dof"]:
     """Process noise (dof, dof) that also forgives an unmodelled force of `share` of the elastic force."""
-    if isinstance(nuisances.fine, Imposed):
+    if isinstance(nuisances.inputs, Imposed):
         size = share * np.max(nuisances.spread[nuisances.judged])
-        return size**2 * np.eye(nuisances.fine.a.shape[1])
+        return size**2 * np.eye(nuisances.inputs.a.shape[1])
     size = share * nuisances.omega**2 * nuisances.length
     forgiven, known = size**2 / nuisances.omega * nuisances.record.dt, np.asarray(nuisances.noise.velocity)
     return known + forgiven * np.eye(len(known))

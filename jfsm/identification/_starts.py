@@ -16,13 +16,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import qmc
 
-from ..dynamics._along import SUBSTEPS
-from ..dynamics._excitation import bucket
-from ..dynamics._imposed import Imposed
-from ..dynamics._law_along import forces_of_law
-from ..dynamics._needed import force_needed
-from ..dynamics._plant import Grid, Plant, direction, lower
 from ..estimation import Latent, latent_force
+from ..plant import HIDDEN_SUBSTEPS, Grid, Imposed, Plant, bucket, direction, force_needed, forces_of_law, lower
 from ..structures import AbstractTerm, LinearDamping, LinearStiffness, MapTerm, Scale, Structure
 from ._nuisances import Nuisances
 
@@ -83,14 +78,14 @@ def scale_of(nuisances: Nuisances, structure: Structure) -> Scale:
 def missing_force(structure: Structure, nuisances: Nuisances, most: int = _SAMPLES) -> Latent:
     """Smoothed motion of a record, its first `most` samples, and the force that a structure lacks to explain it."""
     n = min(nuisances.samples, most)
-    plant = lower(structure, nuisances.channels, grid=Grid(nuisances.record.dt, nuisances.fine.substeps))
+    plant = lower(structure, nuisances.channels, grid=Grid(nuisances.record.dt, nuisances.inputs.substeps))
     values, use = (np.asarray(q)[:n] for q in (nuisances.readings.values, nuisances.readings.use))
-    if isinstance(nuisances.fine, Imposed):
+    if isinstance(nuisances.inputs, Imposed):
         return _measured(plant, nuisances, values, use)
     return latent_force(
         plant,
-        nuisances.show,
-        nuisances.fine,
+        nuisances.observation,
+        nuisances.inputs,
         values,
         use,
         np.asarray(nuisances.readings.variance),
@@ -102,11 +97,11 @@ def missing_force(structure: Structure, nuisances: Nuisances, most: int = _SAMPL
 
 def _measured(plant: Plant, nuisances: Nuisances, values: np.ndarray, use: np.ndarray) -> Latent:
     """The force that a structure lacks along an imposed motion: what was measured, less what the motion needs."""
-    n, imposed = len(values), nuisances.fine
+    n, imposed = len(values), nuisances.inputs
     assert isinstance(imposed, Imposed)
     left = np.zeros((n, plant.dof))
     std = np.zeros_like(left)
-    known = np.asarray(force_needed(plant, nuisances.show, imposed))[:n]
+    known = np.asarray(force_needed(plant, nuisances.observation, imposed))[:n]
     for i in np.flatnonzero(nuisances.judged):
         j, seen = nuisances.channels[i][1] - 1, use[:, i] > 0
         lacking = (values[:, i] - known[:, j]) / (1.0 + float(plant.force_gain[j]))
@@ -440,7 +435,7 @@ def _forces(law: AbstractTerm, numbers: np.ndarray, motion: _Motion, finer: int 
     """Forces (rows, n, dof) of a law along a motion for rows of its numbers."""
     row = direction(law.at, motion.x.shape[1])
     d, w = motion.x @ row, motion.v @ row
-    return forces_of_law(type(law), numbers, d, w, motion.time, substeps=finer * SUBSTEPS)[:, :, None] * row
+    return forces_of_law(type(law), numbers, d, w, motion.time, substeps=finer * HIDDEN_SUBSTEPS)[:, :, None] * row
 
 
 def _regressed(columns: np.ndarray, wanted: np.ndarray, q: np.ndarray):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from ..dynamics._imposed import Imposed
+from ..plant import Imposed
 from ..structures import AccelerationBias, Offset, Parameter, Preload, Structure
 from ._nuisances import Nuisances
 
@@ -196,9 +196,9 @@ def with_offsets(structure: Structure, records: Sequence[Nuisances]) -> Structur
 
 
 def _offset_channels(structure: Structure, nuisances: Nuisances) -> list[tuple[str, int]]:
-    if isinstance(nuisances.fine, Imposed):  # of the motion only displacements; the rest follows these
+    if isinstance(nuisances.inputs, Imposed):  # of the motion only displacements; the rest follows these
         return [c for c in nuisances.channels if c[0] in ("force", "displacement")]
-    acting = np.any(np.asarray(nuisances.fine.force)[:, 0], axis=0)
+    acting = np.any(np.asarray(nuisances.inputs.force)[:, 0], axis=0)
     forces = [c for c in nuisances.record.channels if c[0] == "force" and acting[c[1] - 1]]
     # A bias is an offset by another name, and so is a constant force beside the measured one.
     known: set[tuple[str, int]] = {s.at for s in structure.sensors if isinstance(s, AccelerationBias)}

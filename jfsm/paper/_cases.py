@@ -7,7 +7,8 @@ from types import MappingProxyType
 import numpy as np
 from jaxtyping import Float
 
-from ..dynamics import fixed_points, limit_cycles, lower
+from ..dynamics import fixed_points, limit_cycles
+from ..plant import lower
 from ..structures import Coulomb, CubicStiffness, Structure
 from ..surrogates import RKPM, Discontinuity, find_discontinuities
 from ..surrogates.rkpm.basis import multi_indices

@@ -15,8 +15,9 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.linalg import eigh
 
-from ..dynamics import lower, simulate
+from ..dynamics import simulate
 from ..estimation import Motion, estimate_motion
+from ..plant import lower
 from ..records import Record
 from ..structures import Structure
 from ..surrogates import AbstractForceStateMap

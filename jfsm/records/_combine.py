@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from jfsm.records._abstract_record import UNEVEN
 from jfsm.records._channels import frozen
-from jfsm.records._record import UNEVEN, Record
+from jfsm.records._record import Record
 
 DRIFT = 0.5  # of a sample, that a rate may be off by over a piece and still be the same
 

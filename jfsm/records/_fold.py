@@ -1,19 +1,15 @@
 """A record of periodic excitation as its mean period."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from jfsm.records._abstract_record import AbstractRecord, AnyRecord
 from jfsm.records._channels import frozen
 from jfsm.records._periods import change, common_period, unsettled, whole_periods
 from jfsm.records._silence import silent_forces
 from jfsm.records._tapers import Samples
 
-if TYPE_CHECKING:
-    from jfsm.records._record import Record
 
-
-def fold(record: "Record", period: int | None, transient: int) -> "Record":
+def fold(record: AnyRecord, period: int | None, transient: int) -> AnyRecord:
     """The mean of the last whole periods of a record, all but the first `transient`; errors as `Record.folded`."""
     n, dt = len(record), record.dt
     length = _length(record) if period is None else period
@@ -66,7 +62,7 @@ def fold(record: "Record", period: int | None, transient: int) -> "Record":
     return record._with(time, columns, base, at_rest=False).noted(*words)
 
 
-def _length(record: "Record") -> int:
+def _length(record: AbstractRecord) -> int:
     """Samples of the period that all driving channels share."""
     silent = silent_forces(record)
     acting = {dof: force for (kind, dof), force in record.channels.items() if kind == "force" and dof not in silent}

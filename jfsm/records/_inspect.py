@@ -3,12 +3,13 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
+from jfsm.records._abstract_record import AbstractRecord
 from jfsm.records._checks import ChannelSummary, Finding, examine
 from jfsm.records._coherence import Coherence, coherence
 from jfsm.records._comparison import Comparison, Reading
@@ -23,9 +24,6 @@ from jfsm.records._repeats import copies
 from jfsm.records._silence import is_silent
 from jfsm.records._spectrum import Spectrum, spectrum
 from jfsm.records._trace import Trace
-
-if TYPE_CHECKING:
-    from jfsm.records._record import Record
 
 GAP, LONG_GAP = 1.5, 3.5  # median steps: from here on samples are missing; more than two in a row
 COHERENT = 0.9  # mean coherence below which it is worth a word
@@ -111,7 +109,7 @@ class Inspection:
         write_text_atomically(path, render_inspection({**self.to_dict(), "curves": curves}))
 
 
-def inspect(record: "Record") -> Inspection:
+def inspect(record: AbstractRecord) -> Inspection:
     """All that a record shows by itself, with what is wrong first."""
     findings = [Finding("info", "record", note) for note in record.notes]
     gaps = tuple(_gaps(record.time))
@@ -178,7 +176,7 @@ def inspect(record: "Record") -> Inspection:
     )
 
 
-def _every_channel(record: "Record") -> dict[str, tuple[str, np.ndarray]]:
+def _every_channel(record: AbstractRecord) -> dict[str, tuple[str, np.ndarray]]:
     """Unit and samples of every channel, the base too, by the name shown."""
     shown = {f"{kind} {dof}": (record.units[kind], samples) for (kind, dof), samples in record.channels.items()}
     if record.base_acceleration is not None:
@@ -193,7 +191,7 @@ def _gaps(time: NDArray[np.float64]) -> Iterator[tuple[float, float]]:
         yield float(time[i]), float(time[i + 1])
 
 
-def _of_the_clock(record: "Record", gaps: tuple[tuple[float, float], ...]) -> Iterator[Finding]:
+def _of_the_clock(record: AbstractRecord, gaps: tuple[tuple[float, float], ...]) -> Iterator[Finding]:
     """Uneven steps and gaps."""
     try:
         _ = record.dt
@@ -210,7 +208,7 @@ def _of_the_clock(record: "Record", gaps: tuple[tuple[float, float], ...]) -> It
         yield Finding("warning" if long else "info", "record", message)
 
 
-def _turning(record: "Record", acceleration: str) -> np.ndarray | None:
+def _turning(record: AbstractRecord, acceleration: str) -> np.ndarray | None:
     """Samples within two of which the point of an accelerometer turns or stands; None if nothing tells its velocity."""
     dof = int(acceleration.split()[1])
     rate = record.channels.get(("velocity", dof))
@@ -224,7 +222,7 @@ def _turning(record: "Record", acceleration: str) -> np.ndarray | None:
     return binary_dilation(slow, iterations=2)
 
 
-def _silent(record: "Record", summaries: Mapping[str, ChannelSummary]) -> tuple[int, ...]:
+def _silent(record: AbstractRecord, summaries: Mapping[str, ChannelSummary]) -> tuple[int, ...]:
     """Dofs whose force is noise that no response follows."""
     return tuple(
         dof
@@ -235,7 +233,7 @@ def _silent(record: "Record", summaries: Mapping[str, ChannelSummary]) -> tuple[
     )
 
 
-def _of_the_test(record: "Record", silent: tuple[int, ...]) -> Iterator[Finding]:
+def _of_the_test(record: AbstractRecord, silent: tuple[int, ...]) -> Iterator[Finding]:
     """What the channels together say of the kind of test."""
     forces = [dof for kind, dof in record.channels if kind == "force"]
     for dof in silent:
@@ -253,7 +251,7 @@ def _of_copies(readings: Mapping[str, Reading]) -> Iterator[Finding]:
 
 
 def _of_points(
-    record: "Record",
+    record: AbstractRecord,
     readings: Mapping[str, Reading],
     summaries: Mapping[str, ChannelSummary],
     silent: tuple[int, ...],
@@ -298,7 +296,7 @@ def _relative(reading: Reading, base: Reading | None, kind: str) -> Reading:
 
 
 def _causes_and_effects(
-    record: "Record", readings: Mapping[str, Reading], silent: tuple[int, ...]
+    record: AbstractRecord, readings: Mapping[str, Reading], silent: tuple[int, ...]
 ) -> tuple[dict[str, Reading], dict[str, Reading]]:
     """The channels that drive, and those that answer."""
     quiet = {f"force {dof}" for dof in silent}
@@ -345,7 +343,7 @@ def _of_spectra(spectra: tuple[NoiseSpectrum, ...], summaries: Mapping[str, Chan
             yield Finding("info", one.channel, message)
 
 
-def _of_periods(periods: Periods, record: "Record", summaries: Mapping[str, ChannelSummary]) -> Iterator[Finding]:
+def _of_periods(periods: Periods, record: AbstractRecord, summaries: Mapping[str, ChannelSummary]) -> Iterator[Finding]:
     message = f"Periodic: {periods.count} periods of {periods.samples} samples ({periods.seconds:.4g} s) agree."
     if periods.transient:
         settled = record.time[len(record) - periods.count * periods.samples]

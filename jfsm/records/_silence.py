@@ -1,21 +1,18 @@
 """Forces that are noise only: the test was a free decay with the force channel left on."""
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from jfsm.records._abstract_record import AbstractRecord
 from jfsm.records._noise_floor import SHORTEST, noise_floor
-
-if TYPE_CHECKING:
-    from jfsm.records._record import Record
 
 SEGMENT, SEGMENTS = 64, 16  # samples of a segment at most, and segments at least
 SIGNIFICANT = 5.0  # standard deviations by which phases must agree more than those of strangers
 
 
-def silent_forces(record: "Record") -> tuple[int, ...]:
+def silent_forces(record: AbstractRecord) -> tuple[int, ...]:
     """Dofs whose force channel is noise only, and counts as zero.
 
     Raises

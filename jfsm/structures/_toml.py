@@ -3,13 +3,13 @@
 import io
 import os
 import tomllib
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import tomli_w
 
+from .._map_reader import read_map
 from ..reporting import write_atomically
 from ._sensors import SENSORS
 from .terms import TERMS, MapTerm
@@ -124,5 +124,4 @@ def _map(file: Any, target: Path) -> Any:
     """The map in a file beside the TOML."""
     if not isinstance(file, str):
         raise TypeError(f'`file` must name the file of a map, as file = "model.map.npz"; got {file!r}.')
-    # Maps live in a room below this one, and know this one: it is asked for by name, when there is a map to read.
-    return import_module("jfsm.surrogates").load_map(target.parent / file)
+    return read_map(target.parent / file)

@@ -1,4 +1,4 @@
-"""What a hypothesis asks of the model's own values: how far they go, and what that costs."""
+"""The model's own values in a fitted hypothesis: whether they reached a bound, and their cost in nats."""
 
 import math
 from collections.abc import Sequence
@@ -7,7 +7,7 @@ import numpy as np
 
 from ...identification import Unknown, prior
 from ...structures import is_offset
-from .._trial import Trial, ended, own_values
+from .fitted import Trial, ended, own_values
 
 _HARDLY_TRUSTED = math.log(2.0)
 """Width of an own value's prior from which it may be nothing: its owner trusts it to the whole of itself."""
@@ -21,15 +21,20 @@ def at_bounds(trial: Trial) -> set[str]:
     So it is with the size of a sensor's fault. Damping may go: a model without friction often states as viscous what
     friction takes. And so may what its owner hardly trusts.
     """
-    faults = {effect.cause.effect.kind for effect in trial.effects if effect.cause.is_sensor}
-    own = [*own_values(trial), *((u, theta) for u, theta in ended(trial) if u.path.split("@")[0] in faults)]
-    low = [u for u, theta in own if theta < u.low + _NEAR and not u.path.startswith("damping@")]
-    high = {u.path for u, theta in own if theta > u.high - _NEAR}
+    values = _may_make_up(trial)
+    low = [u for u, theta in values if theta < u.low + _NEAR and not u.path.startswith("damping@")]
+    high = {u.path for u, theta in values if theta > u.high - _NEAR}
     return high | {u.path for u in low if u.width < _HARDLY_TRUSTED}
 
 
+def _may_make_up(trial: Trial) -> list[tuple[Unknown, float]]:
+    """Own values and sizes of sensors' faults, which may make up for a force, and where they ended."""
+    faults = {effect.cause.effect.kind for effect in trial.effects if effect.cause.is_sensor}
+    return [*own_values(trial), *((u, theta) for u, theta in ended(trial) if u.path.split("@")[0] in faults)]
+
+
 def prior_cost(trial: Trial) -> float:
-    """Nats that a trial's own values cost beside those stated."""
+    """Nats that a trial's own values cost, compared with those stated."""
     return _cost(own_values(trial))
 
 

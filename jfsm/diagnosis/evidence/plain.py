@@ -12,20 +12,22 @@ def as_plain(value: Any, *, lossless: bool = True) -> Any:
     Numbers without bounds, which JSON does not have, are their names, from which `float` makes them again; None if it
     need not be `lossless`.
     """
-
-    def plain(each: Any) -> Any:
-        return as_plain(each, lossless=lossless)
-
-    if hasattr(value, "__dataclass_fields__"):
-        return {name: plain(getattr(value, name)) for name in value.__dataclass_fields__}
-    if hasattr(value, "_asdict"):
-        return plain(value._asdict())
+    value = _built_in(value)
     if isinstance(value, dict):
-        return {name: plain(each) for name, each in value.items()}
-    if isinstance(value, list | tuple | np.ndarray):
-        return [plain(each) for each in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
+        return {name: as_plain(each, lossless=lossless) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [as_plain(each, lossless=lossless) for each in value]
     if isinstance(value, float) and not math.isfinite(value):
         return str(value) if lossless else None
+    return value
+
+
+def _built_in(value: Any) -> Any:
+    """A dataclass or a named tuple as a dictionary, an array as a list, a NumPy number as a number."""
+    if hasattr(value, "__dataclass_fields__"):
+        return {name: getattr(value, name) for name in value.__dataclass_fields__}
+    if hasattr(value, "_asdict"):
+        return value._asdict()
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
     return value

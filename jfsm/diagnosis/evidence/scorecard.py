@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...structures import AccelerationBias, AccelerationGain, ForceGain, Preload, Structure
-from .._between import differences
-from .._effect import Effect
-from .._trial import Trial
+from ..hypotheses.effect import Effect
+from .between_records import differences
+from .fitted import Trial
 from .own_values import at_bounds, offset_cost, prior_cost
 from .plain import as_plain
 from .prediction import Prediction

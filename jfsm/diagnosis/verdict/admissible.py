@@ -147,16 +147,22 @@ def _is_enough(alone: Scorecard, pair: Scorecard, bench: Bench) -> Reason:
     """What makes one effect alone enough, beside which a pair has another one."""
     if _shows_as_a_bias(pair, alone, bench):
         return ""
-    absorbed = _may_be_absorbed(pair, alone, bench)
-    unseen = bench.noise_only(pair) and (absorbed or not bench.shows(alone))
-    prespecified = unseen and absorbed and bench.noise_only(alone)
+    unseen, prespecified = _separation(pair, alone, bench)
     least = bench.limits.significant if prespecified else bench.limits.searched
     nats = pair.evidence - alone.evidence
     says = f"gains {shown(nats)} nats over {alone.label} alone; more than {least:.4g} are needed"
     probable = bench.check("second_effect_pays", pair.key, nats, least, says).passed
-    if unseen:  # predictions do not separate the two
-        return "" if probable else "is about as probable"
-    return "" if probable and _predicts_better(alone, pair, bench) else "explains it about as well"
+    if probable and (unseen or _predicts_better(alone, pair, bench)):
+        return ""
+    return "is about as probable" if unseen else "explains it about as well"
+
+
+def _separation(pair: Scorecard, alone: Scorecard, bench: Bench) -> tuple[bool, bool]:
+    """Whether predictions do not separate a pair from one effect alone; and whether this is a comparison that was named
+    beforehand, with an effect that own values or offsets may stand for."""
+    absorbed = _may_be_absorbed(pair, alone, bench)
+    unseen = bench.noise_only(pair) and (absorbed or not bench.shows(alone))
+    return unseen, unseen and absorbed and bench.noise_only(alone)
 
 
 def _predicts_better(alone: Scorecard, pair: Scorecard, bench: Bench) -> bool:
@@ -236,7 +242,7 @@ def _holds_without_time(card: Scorecard, bench: Bench) -> Reason:
     if not bench.evidence.setting.model_error or not card.timed:
         return ""
     says = "depends on time, and no second record shows the same"
-    bench.check("shown_by_a_second_record", card.key, 0, 0, says)
+    bench.check("identifiable_here", card.key, 1, 0, says)
     return says
 
 
@@ -244,7 +250,7 @@ def _takes_the_drives_place(card: Scorecard, bench: Bench) -> Reason:
     if not card.in_step:
         return ""
     says = "takes the place of a noisy drive, with which it is in step"
-    bench.check("out_of_step_with_drive", card.key, 1, 0, says)
+    bench.check("identifiable_here", card.key, 1, 0, says)
     return says
 
 

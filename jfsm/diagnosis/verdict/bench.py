@@ -46,9 +46,9 @@ class Bench:
         """Candidates that nothing speaks against."""
         return [card for card in self.candidates if not self.reasons.get(card.key)]
 
-    def check(self, name: str, of: str, measured: float, limit: float, says: str) -> Check:
+    def check(self, name: str, of: str, measured: float, limit: float, says: str, unit: str | None = None) -> Check:
         """One comparison, which the log keeps."""
-        self.log.append(checked(name, of, measured, limit, says))
+        self.log.append(checked(name, of, measured, limit, says, unit))
         return self.log[-1]
 
     def stop(self, check: Check) -> None:

@@ -115,7 +115,8 @@ CHECKS: Mapping[str, Kind] = {
         "admissible",
         ">=",
         "share of excess power",
-        "It explains half of the error power that the refitted model leaves beyond noise, on every set of samples.",
+        "It explains half of the error power that the refitted model leaves beyond noise, on every set of samples; own "
+        "values that leave more than noise, half of what the model as given leaves.",
         ("half", "noticeable", "chance"),
     ),
     "second_effect_pays": Kind(
@@ -146,17 +147,13 @@ CHECKS: Mapping[str, Kind] = {
         "Beside it no offset of an accelerometer is so large that it is a bias.",
         ("bias",),
     ),
-    "shown_by_a_second_record": Kind(
-        "admissible",
-        ">",
-        "records that show the same",
-        "Where a model error is admitted, a change with time is shown by a second record.",
-    ),
-    "out_of_step_with_drive": Kind(
+    "identifiable_here": Kind(
         "admissible",
         "<=",
-        "loads of the drive's line",
-        "It is no load of the single line that drives the structure, which takes the place of the noisy drive.",
+        "reasons why not",
+        "These records can show it: no change with time in a single decay, nor by one record where a model error is "
+        "admitted; no load in step with a single line that drives the structure; no two laws where predictions of the "
+        "refitted model show nothing.",
     ),
     "no_simpler_law_as_good": Kind(
         "named",
@@ -186,26 +183,13 @@ CHECKS: Mapping[str, Kind] = {
         "The numbers of its law are the same in all records; else it is half as sure.",
         ("differs",),
     ),
-    "innovations_are_white": Kind(
+    "leaves_only_noise": Kind(
         "sufficient",
         "<",
-        "correlation",
-        "What it leaves does not correlate from sample to sample.",
-        ("white",),
-    ),
-    "noise_is_the_floor": Kind(
-        "sufficient",
-        "<",
-        "log of a ratio",
-        "What it leaves is as large as the noise floor of the channels.",
-        ("noise_scale",),
-    ),
-    "leaves_little": Kind(
-        "sufficient",
-        "<",
-        "share of the signal",
-        "Its predictions leave nothing beyond noise.",
-        ("negligible", "chance"),
+        "correlation, log of a ratio, or share of the signal",
+        "What it leaves does not correlate from sample to sample, is as large as the noise floor of the channels, and "
+        "shows in no prediction. The row has what is furthest from its limit.",
+        ("white", "noise_scale", "negligible", "chance"),
     ),
     "map_adds_little": Kind(
         "sufficient",
@@ -221,25 +205,19 @@ CHECKS: Mapping[str, Kind] = {
         "If it leaves much of the signal, it explains nearly all of the rest: else it is only the nearest law.",
         ("nearly_all", "much"),
     ),
-    "values_explain_half": Kind(
-        "sufficient",
-        ">=",
-        "share of excess power",
-        "Own values that leave more than noise explain half of what the model as given leaves.",
-        ("half",),
-    ),
     "values_leave_little": Kind(
         "sufficient",
         "<",
         "share of the signal",
-        "And their predictions leave less than twice what is negligible.",
+        "Own values that leave more than noise leave less than twice what is negligible.",
         ("negligible",),
     ),
     "right_shape": Kind(
         "sufficient",
         "<=",
         "nats",
-        "Forces of other shapes would gain only a small share of what it gains itself (a score test).",
+        "Forces of other shapes would gain only a small share of what it gains itself (a score test), and would not "
+        "explain half of innovations that are not white.",
         (
             "other_shapes",
             "other_shapes_of_values",
@@ -247,27 +225,9 @@ CHECKS: Mapping[str, Kind] = {
             "other_shapes_of_two",
             "other_shapes_white",
             "other_shapes_of_white",
+            "rest_with_shape",
             "alike",
         ),
-    ),
-    "rest_without_shape": Kind(
-        "sufficient",
-        "<=",
-        "share of the innovations' power",
-        "Forces of other shapes would not explain half of what it leaves.",
-        ("rest_with_shape",),
-    ),
-    "identifiable_here": Kind(
-        "sufficient",
-        "<=",
-        "reasons why not",
-        "These records can show it: not a change with time in a single decay, nor a load in step with a single line.",
-    ),
-    "two_laws_are_seen": Kind(
-        "sufficient",
-        ">",
-        "sets of samples that show them",
-        "Predictions of the refitted model show something, if two laws are to be named.",
     ),
     "not_worse": Kind(
         "confirmed",
@@ -293,14 +253,8 @@ CHECKS: Mapping[str, Kind] = {
         "confirmed",
         ">=",
         "share of held-out error",
-        "A map, or what only a long run shows, closes half of the held-out error.",
-        ("half",),
-    ),
-    "may_close_half": Kind(
-        "confirmed",
-        ">=",
-        "share of held-out error",
-        "If it leaves more than noise, its held-out run may close half of the error; else it is half as sure.",
+        "A map, or what only a long run shows, closes half of the held-out error; a cause that leaves more than noise "
+        "may close it, else it is half as sure.",
         ("half",),
     ),
     "closes_nearly_all": Kind(
@@ -316,8 +270,8 @@ CHECKS: Mapping[str, Kind] = {
 _HOLDS = {">=": ge, "<=": le, ">": gt, "<": lt}
 
 
-def checked(name: str, of: str, measured: float, limit: float, says: str) -> Check:
-    """The outcome of a check of `CHECKS`, of the hypothesis with the key `of`."""
+def checked(name: str, of: str, measured: float, limit: float, says: str, unit: str | None = None) -> Check:
+    """The outcome of a check of `CHECKS`, of the hypothesis with the key `of`, in the check's unit or another one."""
     kind = CHECKS[name]
     passed = bool(_HOLDS[kind.relation](measured, limit))
-    return Check(kind.stage, name, of, float(measured), kind.relation, float(limit), kind.unit, passed, says)
+    return Check(kind.stage, name, of, float(measured), kind.relation, float(limit), unit or kind.unit, passed, says)

@@ -89,7 +89,7 @@ class _Hearing:
             return False
         high, half = self.errors.interval[1], self.bench.limits.half
         says = f"closes {high:.0%} of the error on held-out readings at most; at least {half:.0%} is needed"
-        return not self._check("may_close_half", high, half, says).passed
+        return not self._check("closes_half", high, half, says).passed
 
     def _check(self, name: str, measured: float, limit: float, says: str) -> Check:
         return self.bench.check(name, self.decision.winner, measured, limit, says)

@@ -94,35 +94,22 @@ class _Judgement:
         return "parameters" if winner is bench.refitted and self._refit_explains_enough() else self._undecided(winner)
 
     def _leaves_only_noise(self, card: Scorecard) -> bool:
-        bench, limits, of = self.bench, self.bench.limits, card.key
-        left = bench.left(card)
-        rows = [
-            bench.check(
-                "innovations_are_white",
-                of,
-                card.whiteness,
-                limits.white,
-                f"its innovations correlate by {card.whiteness:.2g} from sample to sample; "
-                f"below {limits.white:.2g} is white",
-            ),
-            bench.check(
-                "noise_is_the_floor",
-                of,
-                card.noise_scale,
-                limits.noise_scale,
-                f"the noise that was fitted departs from the noise floor by {card.noise_scale:.2g}, as a logarithm; "
-                f"less than {limits.noise_scale:.2g} is the floor",
-            ),
-            bench.check(
-                "leaves_little",
-                of,
-                left,
-                limits.negligible,
-                f"its predictions leave {left:.2%} of the signal beyond noise; "
-                f"below {limits.negligible:.0%} is nothing",
-            ),
-        ]
-        return all(row.passed for row in rows)
+        """White innovations, of the size of the noise floor, and predictions that leave nothing; the row has the one of
+        the three that is the furthest from its limit."""
+        limits, left = self.bench.limits, self.bench.left(card)
+        measures = (
+            (card.whiteness, limits.white, "correlation"),
+            (card.noise_scale, limits.noise_scale, "log of a ratio"),
+            (left, limits.negligible, "share of the signal"),
+        )
+        measured, limit, unit = max(measures, key=lambda one: one[0] / one[1])
+        says = (
+            f"its innovations correlate by {card.whiteness:.2g} from sample to sample (below {limits.white:.2g} is "
+            f"white), its noise departs from the floor by {card.noise_scale:.2g}, as a logarithm (below "
+            f"{limits.noise_scale:.2g} is the floor), and its predictions leave {left:.2%} of the signal beyond noise "
+            f"(below {limits.negligible:.0%} is nothing)"
+        )
+        return self.bench.check("leaves_only_noise", card.key, measured, limit, says, unit).passed
 
     def _nothing_detected(self, winner: Scorecard, noise_only: bool) -> bool:
         bench, limits = self.bench, self.bench.limits
@@ -175,7 +162,7 @@ class _Judgement:
         bench, limits = self.bench, self.bench.limits
         share, left = bench.explained(bench.refitted, bench.given), bench.left(bench.refitted)
         says = f"own values explain {share:.0%} of what the model as given leaves; at least {limits.half:.0%} is needed"
-        half = bench.check("values_explain_half", REFITTED, share, limits.half, says)
+        half = bench.check("explains_half_of_excess", REFITTED, share, limits.half, says)
         much = 2 * limits.negligible
         says = f"the refitted model leaves {left:.2%} of the signal beyond noise; less than {much:.0%} is needed"
         little = bench.check("values_leave_little", REFITTED, left, much, says)
@@ -211,14 +198,14 @@ class _Judgement:
 
     def _values_are_right(self, winner: Scorecard) -> str:
         bench, of = self.bench, [winner.key]
-        far, checks = doubt(winner, winner.evidence - bench.given.evidence, bench)
+        far, check = doubt(winner, winner.evidence - bench.given.evidence, bench)
         bench.less_sure(of, "other shapes would gain beside it", 1.0 - 0.5 * min(far, 1.0))
-        if far > 1.0:
+        if not check.passed:
             bench.less_sure(of, "it is refused", 0.0)
         row = self._probability_of(winner)
         if row.passed:
             return "parameters"
-        bench.stop(next((check for check in checks if not check.passed), row))
+        bench.stop(row if check.passed else check)
         return "undecided"
 
     def _probability_of(self, winner: Scorecard) -> Check:

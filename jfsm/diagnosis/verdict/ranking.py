@@ -59,17 +59,18 @@ def _beside_likelier_laws(winner: Scorecard, bench: Bench) -> None:
     """
     if winner.laws or not winner.effects or not bench.noise_only(bench.refitted):
         return
-
-    def wants_a_margin(card: Scorecard) -> bool:
-        single = len(card.effects) == 1 and bool(card.laws) and card.evidence > winner.evidence
-        return single and bench.noise_only(card) and is_possible(card, bench)
-
-    likelier = [card for card in bench.apart_from_the_drive if wants_a_margin(card)]
+    likelier = [card for card in bench.apart_from_the_drive if _wants_a_margin(card, winner, bench)]
     if likelier:
         keys = dict.fromkeys([*bench.factors, *(card.key for card in likelier)])
         _share_out([bench.evidence.cards[key] for key in keys], bench)
         why = "is likelier than a sensor's fault, but not than own values that are off by enough to be named"
         bench.reasons |= {card.key: why for card in likelier}
+
+
+def _wants_a_margin(card: Scorecard, winner: Scorecard, bench: Bench) -> bool:
+    """Whether a single law that leaves only noise is likelier than the winner, but not by enough over the refit."""
+    single = len(card.effects) == 1 and bool(card.laws) and card.evidence > winner.evidence
+    return single and bench.noise_only(card) and is_possible(card, bench)
 
 
 def _special_case(winner: Scorecard, passing: Sequence[Scorecard], bench: Bench) -> Scorecard | None:

@@ -15,10 +15,12 @@ WRONG_SHAPE = "explains much of it, but is not of the right shape"
 _UNSEEN = "are two laws of which predictions show nothing, and may stand for one of another shape"
 
 
-def doubt(card: Scorecard, gained: float, bench: Bench, *, shapeless: bool = False) -> tuple[float, list[Check]]:
-    """How far other shapes speak against a hypothesis whose last effect gained so many nats: above 1, too far.
+def doubt(card: Scorecard, gained: float, bench: Bench, *, shapeless: bool = False) -> tuple[float, Check]:
+    """How far other shapes speak against a hypothesis whose last effect gained so many nats, and the check: above 1,
+    too far, it fails.
 
-    With `shapeless` the share of the innovations that they explain is not asked. Beside it the checks that were made.
+    With `shapeless` the share of the innovations that they explain is not asked. Of both the check has the one that is
+    the nearer to its limit.
     """
     limits, shapes = bench.limits, bench.evidence.other_shapes(card.key)
     white = bench.white(card)
@@ -28,13 +30,12 @@ def doubt(card: Scorecard, gained: float, bench: Bench, *, shapeless: bool = Fal
     far = max(shapes.nats - least, 0.0) / max(much - least, least)
     limit = max(much, 2 * least)
     says = f"forces of other shapes would gain {shown(shapes.nats)} nats beside it; {shown(limit)} at most may be left"
-    checks = [bench.check("right_shape", card.key, shapes.nats, limit, says)]
-    if white or shapeless:
-        return far, checks
     rest = limits.rest_with_shape
+    if white or shapeless or shapes.share / rest <= shapes.nats / limit:
+        return far, bench.check("right_shape", card.key, shapes.nats, limit, says)
     says = f"forces of other shapes would explain {shapes.share:.0%} of what it leaves; {rest:.0%} at most may be left"
-    checks.append(bench.check("rest_without_shape", card.key, shapes.share, rest, says))
-    return max(far, shapes.share / rest), checks
+    row = bench.check("right_shape", card.key, shapes.share, rest, says, "share of the innovations' power")
+    return max(far, shapes.share / rest), row
 
 
 class Settled(NamedTuple):
@@ -47,40 +48,40 @@ class Settled(NamedTuple):
 
 def settle_shape(winner: Scorecard, bench: Bench) -> Settled:
     """Whether the winner has the right shape, or another law of its family has where its own is wrong."""
-    found, far, checks = _of_right_shape(winner, bench)
+    found, far, check = _of_right_shape(winner, bench)
     family = [card.key for card in family_of(found, bench)]
     bench.less_sure(family, "other shapes would gain beside it", 1.0 - 0.5 * min(far, 1.0))
     against = _not_identifiable(found, bench) or _both_unseen(found, bench)
     if against is not None:
         bench.refuse(found.key, against.says)
         return Settled(found, against)
-    if far <= 1.0:
+    if check.passed:
         return Settled(found, None)
     near = _nearest(found, bench)
     bench.reasons[found.key] = WRONG_SHAPE
     if near is None:
         bench.refuse(found.key, WRONG_SHAPE)
-    return Settled(found, next(check for check in checks if not check.passed), near)
+    return Settled(found, check, near)
 
 
-def _of_right_shape(winner: Scorecard, bench: Bench) -> tuple[Scorecard, float, list[Check]]:
-    """The winner, or another law of its family whose shape is right where its own is not, with its doubt and checks.
+def _of_right_shape(winner: Scorecard, bench: Bench) -> tuple[Scorecard, float, Check]:
+    """The winner, or another law of its family whose shape is right where its own is not, with its doubt and check.
 
     Predictions that all leave something hardly tell one law from another of its family.
     """
-    far, checks = _doubt_of(winner, winner, bench)
-    if far <= 1.0 or bench.noise_only(winner):
-        return winner, far, checks
+    far, check = _doubt_of(winner, winner, bench)
+    if check.passed or bench.noise_only(winner):
+        return winner, far, check
     for card in _alike(winner, bench):
-        other, checked = _doubt_of(card, winner, bench)
-        if other <= 1.0:
+        other, its = _doubt_of(card, winner, bench)
+        if its.passed:
             bench.refuse(winner.key, WRONG_SHAPE)
             bench.reasons[card.key] = ""
-            return card, other, checked
-    return winner, far, checks
+            return card, other, its
+    return winner, far, check
 
 
-def _doubt_of(card: Scorecard, winner: Scorecard, bench: Bench) -> tuple[float, list[Check]]:
+def _doubt_of(card: Scorecard, winner: Scorecard, bench: Bench) -> tuple[float, Check]:
     """How far other shapes speak against a law.
 
     Where a model error is admitted much of the rest has a shape, and says nothing against a law that explains nearly
@@ -131,4 +132,4 @@ def _both_unseen(card: Scorecard, bench: Bench) -> Check | None:
     laws = [law for law in card.laws if law.role != CONSTANT_FORCE]
     if len(laws) < 2 or bench.shows(bench.refitted):
         return None
-    return bench.check("two_laws_are_seen", card.key, 0, 0, _UNSEEN)
+    return bench.check("identifiable_here", card.key, 1, 0, _UNSEEN)

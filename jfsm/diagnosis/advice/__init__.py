@@ -1,0 +1,1 @@
+"""What to measure next, and the smallest effect that a record would have shown."""

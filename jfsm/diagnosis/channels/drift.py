@@ -1,0 +1,65 @@
+"""Channels whose zero wanders, as with temperature: no motion, and no finding, but a state of the sensor."""
+
+import numpy as np
+
+from ...identification import Nuisances, Posterior
+from ..evidence.fitted import Trial, cost, standardised
+from ..evidence.setup import Problem
+from ..thresholds import THRESHOLDS
+
+_DEGREE = 5
+"""Of the polynomials of time that stand for what is slow."""
+_PERIODS = 2 * _DEGREE
+"""Of the motion, from which these are slow beside it."""
+PLAINLY, SLOWLY = 0.25, 0.05
+"""Share of a channel's innovations that is slow, from which its zero may wander: beside the model alone, of which what
+it lacks may be slow as well, and beside the likeliest law."""
+
+
+def wandering(beside: Trial, problem: Problem, least: float) -> int | None:
+    """The channel whose zero wanders beside a trial, or None; one that is known to do so is none.
+
+    At `least` that share of its innovations is slow, and they are far likelier where the zero may wander.
+    """
+    periods = [until * n.record.dt / n.period for n, until in zip(problem.records, problem.until, strict=True)]
+    if problem.imposed or min(periods) < _PERIODS:
+        return None
+    posterior, known = problem.posterior_of(beside), problem.first.readings.wandering
+    shares = np.mean([_slow(posterior, beside, index) for index in range(len(problem.records))], 0)
+    shares[list(known)] = 0.0
+    channel = int(np.argmax(shares))
+    if shares[channel] < least:
+        return None
+    wandered = problem.with_wandering(channel).posterior_of(beside)
+    gain = cost(posterior, beside.theta) - cost(wandered, beside.theta)
+    return channel if gain > THRESHOLDS.searched else None
+
+
+def _slow(posterior: Posterior, beside: Trial, index: int) -> np.ndarray:
+    """Share of the power of every channel's innovations (channels,) that a slow curve explains."""
+    error = standardised(posterior, beside.theta, index)
+    error = np.where(np.isfinite(error), error, 0.0)
+    return 1.0 - np.sum(steady(error) ** 2, 0) / np.maximum(np.sum(error**2, 0), np.finfo(float).tiny)
+
+
+def steadied(nuisances: Nuisances) -> Nuisances:
+    """The same record without what is slow in the channels whose zeros wander."""
+    wandering = list(nuisances.readings.wandering)
+    if not wandering:
+        return nuisances
+    values = np.array(nuisances.readings.values)[: nuisances.samples]
+    values[:, wandering] = steady(values[:, wandering]) + np.mean(values[:, wandering], 0)
+    return nuisances.showing(values)
+
+
+def steady(y: np.ndarray) -> np.ndarray:
+    """Samples (n, ...) without their mean and what is slow in them."""
+    powers = np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, len(y)), _DEGREE)
+    slow = np.linalg.qr(powers)[0]
+    return y - slow @ (slow.T @ y)
+
+
+def zeros(nuisances: Nuisances) -> list[str]:
+    """What is to be said of the channels whose zeros wander."""
+    channels = [nuisances.channels[c] for c in nuisances.readings.wandering]
+    return [f"The zero of {kind} {j} wanders slowly; that is taken for the sensor's." for kind, j in channels]

@@ -1,0 +1,153 @@
+"""Trials of records as evidence, and what is behind it: structures, maps and runs over held-out readings."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import jax
+
+from ...structures import Clipping, Structure
+from ..hypotheses.effect import key_of
+from ..search.batches import LeftBehind
+from ..search.rounds import Searched
+from ..verdict.decision import Decision
+from .evidence import Evidence, Measure, SetAside, Setting, has_map, map_on
+from .fitted import Trial
+from .free_runs import Gain, measure_gain
+from .held_out import HeldOutErrors
+from .identifiable import in_step, untold
+from .missing_force import stand_in
+from .model_error import forgiving
+from .noise_draws import noise_levels
+from .prediction import Prediction
+from .scorecard import GIVEN, OtherShapes, Scorecard, scorecard
+from .setup import Problem
+from .split import HeldOut
+
+
+@dataclass(frozen=True)
+class HeldOutRuns:
+    """What was held out, the model as it was `stated` and with the clipping that its records show, and a source of
+    noise."""
+
+    stated: Structure
+    model: Structure
+    held: Sequence[HeldOut]
+    key: jax.Array
+
+
+@dataclass
+class Weighed:
+    """What was found, as evidence, by the keys of the hypotheses."""
+
+    found: Searched
+    problem: Problem
+    clipped: Sequence[Clipping]
+    held_out: HeldOutRuns
+    model_error: float = 0.0
+    maps: dict[str, Trial] = field(default_factory=dict)
+    runs: dict[str, tuple[Gain, list[dict]]] = field(default_factory=dict)
+    other: "Weighed | None" = None
+
+    @cached_property
+    def evidence(self) -> Evidence:
+        """Scorecards, and what is measured when it is asked for."""
+        measure = Measure(self._other_shapes, self._with_map, self._held_out, self._with_model_error)
+        cards = {card.key: card for card in self._cards()}
+        return Evidence(self._setting(), cards, measure, tuple(set_aside(self.found, cut=self.problem.limit.over)))
+
+    def behind(self, decision: Decision) -> "Weighed":
+        """What a decision on this evidence rests on."""
+        return self.other if decision.model_error and self.other is not None else self
+
+    def trial(self, key: str) -> Trial:
+        """The hypothesis of a key."""
+        return self.maps[key] if has_map(key) else self._trials[key]
+
+    def gain(self, decision: Decision) -> tuple[Gain | None, list[dict]]:
+        """Gain of what was decided over the model as stated, and the runs behind it; none where nothing is held out."""
+        key = GIVEN if decision.verdict == "consistent" else decision.winner
+        self._held_out(key)
+        return self.runs.get(key, (None, []))
+
+    def extended(self, decision: Decision) -> Structure:
+        """The structure to go on with."""
+        return self.held_out.model if decision.verdict == "consistent" else self.trial(decision.winner).extended()
+
+    @cached_property
+    def _trials(self) -> dict[str, Trial]:
+        return {t.key: t for t in self.found.every}
+
+    def _setting(self) -> Setting:
+        records = self.problem.records
+        return Setting(
+            periods=float(sum(n.record.duration / n.period for n in records)),
+            imposed=self.problem.imposed,
+            model_error=self.model_error,
+            finished=not self.problem.limit.over,
+            clipped=tuple(sensor.at for sensor in self.clipped),
+        )
+
+    def _cards(self) -> Iterator[Scorecard]:
+        every, model, records = self.found.every, self.problem.model, self.problem.records
+        why_not_identifiable, stands_for_the_drive = untold(records), in_step(records)
+        for t in every:
+            if self.model_error:  # laws of time are none here, whatever the records show
+                yield scorecard(t, every, model)
+            else:
+                yield scorecard(
+                    t, every, model, in_step=stands_for_the_drive(t), not_identifiable=why_not_identifiable(t)
+                )
+
+    def _other_shapes(self, key: str) -> OtherShapes:
+        return self.found.lack(self.trial(key))
+
+    def _with_map(self, key: str) -> Prediction | None:
+        found = None if self.problem.limit.over else stand_in(self.trial(key), self.problem)
+        if found is None:
+            return None
+        self.maps[map_on(key)] = found
+        return found.prediction
+
+    def _held_out(self, key: str) -> HeldOutErrors | None:
+        runs = self.held_out
+        if not runs.held:
+            return None
+        if key not in self.runs:
+            trial, refitted, first = self.trial(key), self.found.refitted, self.problem.first
+            extended = (lambda record: runs.model) if key == GIVEN else trial.extended
+            noise = noise_levels(trial, first)
+            self.runs[key] = measure_gain(runs.stated, refitted.extended, extended, runs.held, noise, first, runs.key)
+        return self.runs[key][0].errors
+
+    def _with_model_error(self) -> Evidence | None:
+        again = None if self.model_error else forgiving(self.found.every, self.problem)
+        if again is None:
+            return None
+        problem, (given, refitted, *trials) = again
+        found = self.found.judged_in(problem, given, refitted, trials)
+        self.other = Weighed(found, problem, self.clipped, self.held_out, problem.first.forgiven)
+        return self.other.evidence
+
+
+def set_aside(found: Searched, *, cut: bool) -> Iterator[SetAside]:
+    """The candidates that were not fitted to their end, of a search that may have been `cut` short, and why."""
+    for behind in found.behind:
+        nats = behind.nats if math.isfinite(behind.nats) else None
+        yield SetAside(key_of(behind.effects), _why_behind(behind), nats=nats)
+    for candidate in found.left_out:
+        share = candidate.share or 0.0
+        yield SetAside(key_of(candidate.effects), _why_left_out(share, cut=cut), share=share)
+
+
+def _why_behind(behind: LeftBehind) -> str:
+    if math.isinf(behind.nats):
+        return "not tried: the time was over"
+    met = "not at its top when the time was over" if behind.cut else "not pursued"
+    return f"{met}: {behind.nats:.3g} nats behind the best where a misfit is still forgiven"
+
+
+def _why_left_out(share: float, *, cut: bool) -> str:
+    rest = "the time was over" if cut else "other laws more"
+    return f"not fitted: explains {share:.0%} of the missing force, and {rest}"

@@ -1,0 +1,101 @@
+"""Candidates for a diagnosis: every cause at every place where it could sit, with its starts."""
+
+from collections.abc import Mapping, Sequence
+from itertools import chain
+
+from ..._threads import side_by_side
+from ...identification import Nuisances
+from ...structures import (
+    AccelerationBias,
+    AccelerationGain,
+    Cause,
+    ChannelDelay,
+    Clipping,
+    CoulombAsymmetric,
+    ForceGain,
+    Preload,
+    Structure,
+    causes,
+)
+from .candidate import Candidate
+from .effect import Effect
+from .natural_starts import natural_starts
+from .placement import Laws
+
+_NOT_BESIDE_A_MOTION = (ForceGain, ChannelDelay, AccelerationBias, AccelerationGain, Preload, CoulombAsymmetric)
+"""Effects that an imposed motion does not show: a gain of the force is that of all own values, a constant force its
+offset, asymmetric friction friction beside an offset, a late motion an early force, and what is wrong with an
+accelerometer shows beside the displacement."""
+_GAINS = (ForceGain, AccelerationGain)
+"""Faults that a clipped channel hides: below its limit noise makes it smaller."""
+
+
+def chosen_causes(selection: Sequence[str | Cause] | None) -> dict[str, Cause]:
+    """The causes to try, by id; wrong own values are always tried.
+
+    Raises
+    ------
+    ValueError
+        If an id is not in the catalogue.
+    """
+    known = dict(causes())
+    found = {}
+    for item in known if selection is None else selection:
+        if isinstance(item, Cause):
+            found[item.id] = item
+        elif item in known:
+            found[item] = known[item]
+        else:
+            raise ValueError(
+                f"`causes` must name causes of the catalogue ({', '.join(known)}) or be causes; got {item!r}."
+            )
+    return {name: cause for name, cause in found.items() if not cause.is_value}
+
+
+def candidates(
+    model: Structure,
+    records: Sequence[Nuisances],
+    selection: Mapping[str, Cause],
+    places: Sequence[tuple] | None = None,
+) -> list[Candidate]:
+    """Every cause of `selection` at every place: laws on links or masses, sensor effects on the channels."""
+    first = records[0]
+    fitted = _fitted(selection, imposed=first.path is not None)
+    laws = [Effect(cause, at) for cause in fitted if not cause.is_sensor for at in _links(cause, model, places)]
+    faults = [Effect(cause, at) for cause in fitted if cause.is_sensor for at in _channels(cause, model, records)]
+    placed = chain.from_iterable(side_by_side(Laws(model, first).of, laws)) if laws else ()
+    return [*placed, *(Candidate((fault,), natural_starts(model, *fault, first)) for fault in faults)]
+
+
+def _fitted(selection: Mapping[str, Cause], *, imposed: bool) -> list[Cause]:
+    """Causes that have a number to fit (a clipped channel shows by itself) and that an `imposed` motion shows."""
+    excluded = _NOT_BESIDE_A_MOTION if imposed else ()
+    return [c for c in selection.values() if any(p.free for p in c.effect.parameters) and c.effect not in excluded]
+
+
+def _links(cause: Cause, model: Structure, places: Sequence[tuple] | None) -> list[tuple]:
+    """Places of a law: the links; the masses if it hangs on one or loads it from outside."""
+    masses = [(0, j) for j in range(1, model.dof + 1)]
+    if cause.effect.hangs:
+        return [at for at in masses if places is None or at in places]
+    return list(places if places is not None else masses if cause.family == "input" else model.links)
+
+
+def _channels(cause: Cause, model: Structure, records: Sequence[Nuisances]) -> list[tuple[str, int]]:
+    """Channels that may have a sensor's fault."""
+    imposed = records[0].path is not None
+    kinds = ("force",) if imposed else [kind for kind in cause.effect.channels if _shows(cause.effect, kind, records)]
+    channels = dict.fromkeys(c for n in records for c in n.record.channels if c[0] in kinds)
+    hidden = _clipped(model) if cause.effect in _GAINS else set()
+    return [at for at in channels if at not in hidden]
+
+
+def _clipped(model: Structure) -> set[tuple]:
+    return {sensor.at for sensor in model.sensors if isinstance(sensor, Clipping)}
+
+
+def _shows(effect: type, kind: str, records: Sequence[Nuisances]) -> bool:
+    """Whether anything but the channels of this kind tells how large and how late they are; a bias needs none."""
+    if kind == "force":
+        return any(n.driven for n in records)
+    return effect is AccelerationBias or any(n.driven or any(c[0] != kind for c in n.channels) for n in records)

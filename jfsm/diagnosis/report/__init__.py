@@ -1,0 +1,1 @@
+"""A decision put into values, words and plain data."""

@@ -1,0 +1,134 @@
+"""A diagnosis, assembled from a decision and what was measured for it."""
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+from ...structures import AbstractTerm, Clipping, Structure
+from .._diagnosis import CandidateResult, Diagnosis
+from ..advice.detection_limits import Smallest
+from ..advice.next_test import Leading
+from ..channels.coloured_noise import memories
+from ..channels.drift import zeros
+from ..channels.stationarity import unsteady
+from ..evidence.between_records import differences
+from ..evidence.evidence import Evidence
+from ..evidence.fitted import Trial
+from ..evidence.free_runs import Gain, how_run
+from ..evidence.missing_force import Residual
+from ..evidence.plain import as_plain
+from ..evidence.scorecard import GIVEN
+from ..evidence.setup import Problem
+from ..hypotheses.candidate import Candidate
+from ..search.batches import LeftBehind
+from ..verdict.decision import Decision
+from .estimates import Units, noise_by_channel, refitted_values, smallest_effects, unit_of
+from .findings import findings_of, fitted_candidate, unfitted_candidate
+from .force_shape import shape_of
+from .plain_data import Drawn, jfsm_version, plain_gain, plain_record
+from .sentences import difference_sentence, verdict_advice, verdict_sentence
+from .unfinished import Unfinished
+
+
+class Tested(NamedTuple):
+    """All candidates, and what else was looked into.
+
+    These are candidates that were fitted, those that were fitted in part, those that were not, the smallest effects
+    that would have been seen, the nats that other shapes would gain beside a trial, and what was not done.
+    """
+
+    trials: list[Trial]
+    behind: list[LeftBehind]
+    left_out: list[Candidate]
+    seen: list[Smallest]
+    unfit: Callable[[Trial], float | None]
+    unfinished: Unfinished
+
+
+class Reached(NamedTuple):
+    """The decision, the trial that it rests on, the law that was named, if one was, and all the evidence."""
+
+    decision: Decision
+    winner: Trial
+    term: AbstractTerm | None
+    evidence: Evidence
+
+
+def assemble(
+    reached: Reached,
+    clipped: list[Clipping],
+    refitted: Trial,
+    tested: Tested,
+    problem: Problem,
+    extended: Structure,
+    missing: Residual,
+    gain: Gain | None,
+    runs: list[dict],
+    leading: Leading | None,
+) -> Diagnosis:
+    """The diagnosis, with everything that the report needs."""
+    decision, unfinished, model, records = reached.decision, tested.unfinished, problem.model, problem.records
+    first, verdict = records[0], decision.verdict
+    units, imposed = first.record.units, first.path is not None
+    findings = findings_of(decision, reached.winner, tested.trials, clipped, model, first)
+    candidates = tuple(_candidates(tested, decision, refitted, model, units))
+    winner = reached.winner if decision.winner != GIVEN else refitted
+    refit = refitted_values(winner, model, units)
+    between = [] if verdict == "consistent" else differences(winner)
+    differ = [difference_sentence(one, unit_of(winner.structure, one.path, units)) for one in between]
+    notes = tuple(dict.fromkeys(_notes(unfinished, problem, differ, winner)))
+    smallest = smallest_effects(tested.seen, units)
+    shape = shape_of(missing) if verdict in ("undecided", "unnamed") else None
+    drawn = Drawn(missing, runs, reached.term, first.record, first.period, with_shape=verdict != "consistent")
+    sentence = verdict_sentence(decision, reached.winner, findings, gain, shape, differ, imposed=imposed)
+    advice = verdict_advice(decision, gain, imposed=imposed)
+    told = {
+        "jfsm": jfsm_version(),
+        "verdict": verdict,
+        "finished": not unfinished.notes,
+        "untried": list(unfinished.untried),
+        "sentence": sentence,
+        "advice": advice,
+        "record": plain_record(records),
+        "model": model.describe(units),
+        "extended": extended.describe(units),
+        "findings": as_plain(findings, lossless=False),
+        "candidates": as_plain(candidates, lossless=False),
+        "refitted": {p: {"given": model.values()[p], **as_plain(e, lossless=False)} for p, e in refit.items()},
+        "between_records": {one.path: [list(interval) for interval in one.intervals] for one in between},
+        "gain": plain_gain(gain),
+        "notes": list(notes),
+        "detectable": {c: s.plain for c, s in smallest.items()},
+        "decision": decision.plain,
+        "evidence": reached.evidence.plain,
+    }
+    return Diagnosis(
+        verdict=verdict, findings=findings, candidates=candidates, extended=extended, refitted=refit,
+        gain=gain, detectable={c: s.size for c, s in smallest.items()}, noise=noise_by_channel(first), notes=notes,
+        sentence=sentence, advice=advice, told=told, drawn=drawn, leading=leading,
+        decision=decision, finished=not unfinished.notes, untried=unfinished.untried,
+    )  # fmt: skip
+
+
+def _candidates(
+    tested: Tested, decision: Decision, refitted: Trial, model: Structure, units: Units
+) -> Iterator[CandidateResult]:
+    """The fitted candidates, those that were fitted in part and those that were not, the best of each first."""
+    for t in sorted(tested.trials, key=lambda t: -t.evidence):
+        yield fitted_candidate(t, decision, refitted, tested.unfit(t), model, units)
+    for behind in sorted(tested.behind, key=lambda b: b.nats):
+        yield unfitted_candidate(behind.effects, decision)
+    for candidate in sorted(tested.left_out, key=lambda c: -(c.share or 0.0)):
+        yield unfitted_candidate(candidate.effects, decision, candidate.share or 0.0)
+
+
+def _notes(unfinished: Unfinished, problem: Problem, differ: list[str], winner: Trial) -> Iterator[str]:
+    """What was not done, and what a reader has to know about the records and the runs."""
+    first = problem.first
+    yield from unfinished.notes
+    for nuisances in problem.records:
+        yield from nuisances.notes
+    yield from how_run(first)
+    yield from zeros(first)
+    yield from memories(first)
+    yield from differ
+    yield from unsteady(winner, problem)

@@ -1,0 +1,115 @@
+"""A decision in words: the verdict as a sentence, and what to do."""
+
+from collections.abc import Mapping, Sequence
+
+from ...reporting import stopping_line
+from ...structures import Cause, causes
+from .._diagnosis import Finding
+from ..advice.next_test import RIVAL
+from ..evidence.between_records import Difference
+from ..evidence.fitted import Trial
+from ..evidence.free_runs import Gain
+from ..thresholds import THRESHOLDS
+from ..verdict.decision import Decision
+from .force_shape import Shape
+
+_SURE = 0.9
+"""Probability of a cause from which its name is not open."""
+_GO_ON = "Let the search go on to its end before the model is changed."
+_NO_GAIN = "Do not change the model for the sake of its predictions: on held-out readings it gains no more than chance."
+_ADVICE = {
+    "consistent": "Keep the model as it is.",
+    "parameters": "Use the refitted values.",
+    "cause": "Use the extended model.",
+    "unnamed": "Look at the map's shape; record a second run with another amplitude.",
+    "undecided": "Record a second run with another amplitude, or measure the missing channels.",
+}
+_ADVICE_IMPOSED = _ADVICE | {
+    "undecided": "Record a second run with another amplitude, or measure the velocity beside the displacement."
+}
+"""Advice where the motion is imposed."""
+
+
+def verdict_sentence(
+    decision: Decision,
+    winner: Trial,
+    findings: Sequence[Finding],
+    gain: Gain | None,
+    shape: Shape | None,
+    differences: Sequence[str],
+    *,
+    imposed: bool,
+) -> str:
+    """The verdict in words, with the sentences on `differences` between records and the gain on held-out readings."""
+    gained = _gained(gain, imposed=imposed)
+    if decision.verdict == "consistent":
+        return "The record shows nothing beyond noise that the model lacks."
+    if decision.verdict == "parameters":
+        what = "; ".join(f.sentence for f in findings) or "its own values moved together"
+        return " ".join([f"The form of the model is right, its values are off: {what}.", *differences]) + gained
+    if decision.verdict == "cause":
+        return " ".join([_named(decision, winner, findings), *differences]) + gained
+    if decision.verdict == "unnamed":
+        looks = "" if shape is None else f" {shape.words}"
+        return f"A real effect is there that no catalogue entry explains; a map stands in.{looks}{gained}"
+    if not decision.finished:
+        return "The search was ended before it was finished, and nothing that was tried until then is found."
+    stopped = stopping_line(decision.plain)
+    return f"Something is wrong beyond noise, and this record cannot tell what. {stopped}".strip()
+
+
+def verdict_advice(decision: Decision, gain: Gain | None, *, imposed: bool) -> str:
+    """What to do about the verdict."""
+    if decision.verdict in ("cause", "undecided") and not decision.finished:
+        return _GO_ON
+    if decision.verdict in ("cause", "parameters") and gain is not None and not gain.significant:
+        return _NO_GAIN
+    return (_ADVICE_IMPOSED if imposed else _ADVICE)[decision.verdict]
+
+
+def difference_sentence(difference: Difference, unit: str) -> str:
+    """The values of a number that differs between records, in each of them."""
+    records = enumerate(difference.intervals, start=1)
+    each = [f"{value:.4g} [{low:.4g}, {high:.4g}] in record {i}" for i, (value, low, high) in records]
+    return f"Records differ: {difference.path} [{unit}] is {', '.join(each)}."
+
+
+def finding_sentence(finding: Finding, known: Mapping[str, Cause]) -> str:
+    """A finding in words; where its law is open, its class comes first, and then the laws that it may be."""
+    cause, where = known[finding.cause], "-".join(map(str, finding.at))
+    lacks = "The record shows" if cause.is_sensor else "The model lacks"
+    others = [(known[r.cause].label, r.probability) for r in finding.rivals if r.cause in known]
+    if finding.probability < _SURE and finding.kind_probability - finding.probability > RIVAL:
+        listed = ", ".join(f"{name} ({chance:.0%})" for name, chance in [(cause.label, finding.probability), *others])
+        return f"{lacks} {finding.kind} at {where} ({finding.kind_probability:.0%}); its law is open: {listed}."
+    named = f"{lacks} {cause.label} at {where}: {finding.sentence}."
+    if finding.probability >= 0.5 or not finding.rivals:
+        return named
+    return f"{named} By this record it may as well be {' or '.join(dict(others))}."
+
+
+def _named(decision: Decision, winner: Trial, findings: Sequence[Finding]) -> str:
+    """The causes that were named, and what remains unexplained or untried."""
+    known = dict(causes()) | {e.cause.id: e.cause for e in winner.effects}
+    words = " ".join(finding_sentence(f, known) for f in findings) + _remainder(winner)
+    if decision.near == decision.winner:
+        words += " Its shape is not quite that of any law that was tried."
+    if not decision.finished:
+        words += " The search was not finished: what was not tried may explain it as well."
+    return words
+
+
+def _remainder(winner: Trial) -> str:
+    """The error that the named causes leave unexplained; empty where it is negligible."""
+    left = winner.prediction.left()
+    if left < THRESHOLDS.negligible:
+        return ""
+    return f" Something is left beyond {'them' if len(winner.effects) > 1 else 'it'}: {left:.1%} of the signal."
+
+
+def _gained(gain: Gain | None, *, imposed: bool) -> str:
+    """Errors on held-out readings before and after."""
+    if gain is None:
+        return ""
+    error = "error of the predicted force" if imposed else "free-run error"
+    return f" The {error} on held-out readings goes from {gain.before:.2%} to {gain.after:.2%} of the signal."

@@ -1,0 +1,1 @@
+"""Which hypotheses are fitted, in what order, and when to stop."""

@@ -1,0 +1,172 @@
+"""How records are searched: as they are or in pieces, and again where their noise or their numbers differ."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import jax
+import numpy as np
+
+from ..._limit import Limit
+from ...identification import prepare_all
+from ...plant import Reconstruction
+from ...records import Record
+from ...structures import Cause, Structure
+from ..channels.drift import PLAINLY, steadied, wandering
+from ..evidence.between_records import differ
+from ..evidence.excess import white
+from ..evidence.fitted import Trial
+from ..evidence.lack_of_fit import LackOfFit
+from ..evidence.setup import Problem
+from ..hypotheses.candidate import Candidate
+from ..hypotheses.candidates import candidates
+from ..hypotheses.parametrisation import Apart
+from ..thresholds import THRESHOLDS
+from .baseline import believed, refit_from
+from .rounds import Rounds, Searched, amid_noise
+from .searches import search_again
+from .segments import pieces
+from .steps import Steps
+
+_AS_LIKELY = 3.0
+"""Nats by which trials are apart, at most, of which none is likelier than the other."""
+
+Studied = tuple[Problem, list[Candidate], Searched]
+"""What was fitted to, what could be tried, and what was found."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """How records are looked into."""
+
+    model: Structure
+    chosen: dict[str, Cause]
+    places: Sequence[tuple[int, int]] | None
+    reconstruction: Reconstruction
+    key: jax.Array
+    steps: Steps
+    limit: Limit
+    pairs: bool
+
+    def of(
+        self, training: Sequence[tuple[Record, int]], *, unless_later: bool = False, known: Trial | None = None
+    ) -> Studied | Trial:
+        """What is fitted to, what could be tried, what was found.
+
+        Where what the model lacks shows in what was kept back, which then has to be fitted, the best single trial by
+        which it does, `unless_later`; that is `known` then.
+        """
+        problem = self._problem(training)
+        parts = pieces(training, [n.period for n in problem.records])
+        look = self._in_whole if parts is None else partial(self._in_pieces, parts)
+        studied = look(problem, known, unless_later)
+        if isinstance(studied, Trial) or self.limit.over:
+            return studied
+        problem, every, found = studied
+        if unless_later and shows_later(found.every):
+            return max((t for t in found.every if len(t.effects) < 2), key=lambda t: t.evidence)
+        problem, found = self._unless_apart(found, problem)
+        return problem, every, found
+
+    def _in_whole(self, problem: Problem, known: Trial | None, unless_later: bool) -> Studied | Trial:
+        """A search over records as they are."""
+        problem, given, refitted = believed(problem)
+        if unless_later and not self.limit.over and _later(refitted, THRESHOLDS.negligible):
+            return refitted
+        return self._sought(problem, given, refitted, known)
+
+    def _in_pieces(
+        self, parts: Sequence[tuple[Record, int]], problem: Problem, known: Trial | None, unless_later: bool
+    ) -> Studied | Trial:
+        """A search over parts of long records; its best fitted to all of them."""
+        part, every, ahead = self._sought(*believed(self._problem(parts)), known)
+        if self.limit.over:
+            return part, every, ahead
+        problem, given, refitted = believed(problem.knowing(part), near=ahead.refitted)
+        found = self._fitted_again(ahead, given, refitted, problem)
+        if self.limit.over:
+            return part, every, ahead
+        if unless_later and _later(found.refitted, THRESHOLDS.negligible):
+            return found.refitted
+        return problem, every, found
+
+    def _problem(self, training: Sequence[tuple[Record, int]]) -> Problem:
+        """Records, and how much of each is fitted, as the likelihood sees them."""
+        records, until = [whole for whole, _ in training], [fit for _, fit in training]
+        prepared = prepare_all(records, self.model, self.reconstruction)
+        return Problem(self.model, prepared, until, limit=self.limit)
+
+    def _sought(self, problem: Problem, given: Trial, refitted: Trial, known: Trial | None) -> Studied:
+        """What could be tried, and what was found; channels may turn out to drift, or their noise to be coloured.
+
+        Where the time is over before that is known, what was found first is the answer.
+        """
+        self.limit.found()
+        if self.limit.over:
+            return problem, [], Searched(given, refitted, [], [], [], LackOfFit(problem))
+        channel = wandering(refitted, problem, PLAINLY)
+        if channel is not None:
+            return self._sought_with(problem.with_wandering(channel), problem, given, refitted, known)
+        every = candidates(self.model, [steadied(n) for n in problem.records], self.chosen, self.places)
+        rounds = Rounds(every, given, refitted, known, problem, self.steps, self.key, self.pairs)
+        found, other = rounds.run()
+        if other is None or self.limit.over:
+            return problem, every, found
+        studied = self._sought_with(other, problem, given, refitted, known)
+        return (problem, every, found) if self.limit.over else studied
+
+    def _sought_with(
+        self, other: Problem, problem: Problem, given: Trial, refitted: Trial, known: Trial | None
+    ) -> Studied:
+        """What is found with another noise of the channels. What the model lacks may have looked like that: then it
+        holds as well without."""
+        other, every, found = self._sought(*believed(other, near=refitted), known)
+        best = max(found.every, key=lambda t: t.evidence)
+        if best.effects and not self.limit.over:
+            again = search_again([best], refitted, problem, self.steps.of("the best without that")).trials
+            if again and again[0].evidence >= best.evidence:
+                found_again = self._fitted_again(found, given, refitted, problem)
+                if not self.limit.over:
+                    return problem, every, found_again
+        return other, every, found
+
+    def _fitted_again(self, ahead: Searched, given: Trial, refitted: Trial, problem: Problem) -> Searched:
+        """The best of what was found in another problem, as in pieces of long records, fitted from there."""
+        found = search_again(ahead.trials, refitted, problem, self.steps.of("the best again"))
+        refitted = refit_from(found.trials, refitted, problem)
+        _, (given, refitted, *trials) = amid_noise(given, refitted, found.trials, problem, self.key)
+        return ahead.judged_in(problem, given, refitted, trials)
+
+    def _unless_apart(self, found: Searched, problem: Problem) -> tuple[Problem, Searched]:
+        """What was found, or the best of it with numbers that each record has to itself, where records differ in them.
+
+        These have to do so beside the best explanation, not make up for one that is missing.
+        """
+        for apart in (Apart.own, Apart.all) if len(problem.records) > 1 else ():
+            other, best = problem._replace(apart=apart), max(found.every, key=lambda t: t.evidence)
+            if best.effects:
+                tried = search_again([best], best, other, self.steps.of("each record by itself")).trials
+            else:
+                tried = [refit_from([best], best, other)]
+            if self.limit.over:
+                break
+            [alone] = tried
+            if differ(alone.beside(best), best):
+                another, given, refitted = believed(other, near=found.refitted)
+                again = self._fitted_again(found, given, refitted, another)
+                if self.limit.over:
+                    break
+                problem, found = another, again
+        return problem, found
+
+
+def shows_later(trials: Sequence[Trial]) -> bool:
+    """Whether what is lacking shows in what was kept back, beside the best trial and beside all that are as likely."""
+    best = max(t.evidence for t in trials)
+    return all(_later(t, THRESHOLDS.much) for t in trials if t.evidence > best - _AS_LIKELY)
+
+
+def _later(trial: Trial, much: float) -> bool:
+    """Whether a trial leaves nothing of what was fitted, but `much` of what was kept back, as a share of the signal."""
+    fitted, kept_back = (np.sqrt(trial.prediction.beyond()[first::2]) for first in (0, 1))
+    return white(trial) and bool(np.all(fitted < THRESHOLDS.negligible) and np.any(kept_back > much))

@@ -1,0 +1,338 @@
+"""The clock of a record, what was read at each instant, and cuts and changes of both."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Literal, Self, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from jfsm.records._advance import advanced
+from jfsm.records._channels import Columns, as_columns, as_single, as_time, frozen
+from jfsm.records._resample import resampled
+from jfsm.records._units import KINDS, coherent_units, find_unit
+
+Channel = NDArray[np.float64]
+ChannelArgument = ArrayLike | Mapping[int, ArrayLike] | None
+Drive = Literal["force", "motion"]
+
+UNEVEN = 0.05  # relative deviation of a step from the mean step up to which a clock counts as uniform
+NOTED = 1e-4  # above this the deviation is mentioned
+
+
+class AbstractRecord:
+    """The measured data of one run, apart from its inspection and its files. Immutable.
+
+    Functions that read a record take this class; `Record` adds them as methods. Parameters and errors are those of
+    `Record`.
+    """
+
+    def __init__(
+        self,
+        time: ArrayLike,
+        force: ChannelArgument = None,
+        displacement: ChannelArgument = None,
+        velocity: ChannelArgument = None,
+        acceleration: ChannelArgument = None,
+        base_acceleration: ArrayLike | None = None,
+        *,
+        units: Mapping[str, str] | None = None,
+        at_rest: bool = False,
+        drive: Drive = "force",
+        name: str | None = None,
+    ):
+        if drive not in ("force", "motion"):
+            raise ValueError(f'`drive` must be "force" or "motion"; it was {drive!r}. Say which of them is imposed.')
+        for kind in units or {}:
+            if kind not in ("time", *KINDS):
+                raise ValueError(f"`units` must be given by kind, one of time, {', '.join(KINDS)}; it names {kind!r}.")
+        stated = {kind: find_unit(unit, kind) for kind, unit in (units or {}).items()}
+        factors = {kind: unit.factor for kind, unit in stated.items()}
+        self._time = as_time(time, factors.pop("time", 1.0))
+        stated.pop("time", None)
+        self._units = dict(coherent_units(stated))
+        given = {"force": force, "displacement": displacement, "velocity": velocity, "acceleration": acceleration}
+        self._columns: dict[str, Columns] = {
+            kind: as_columns(kind, samples, self._time, factors.get(kind, 1.0))
+            for kind, samples in given.items()
+            if samples is not None
+        }
+        self._base_acceleration: Channel | None = None
+        if base_acceleration is not None:
+            factor = factors.get("base_acceleration", 1.0)
+            self._base_acceleration = as_single("base_acceleration", base_acceleration, self._time, factor)
+        self._at_rest = bool(at_rest)
+        self._drive: Drive = drive
+        self._name = name
+        self._notes: tuple[str, ...] = ()
+
+    @property
+    def time(self) -> Channel:
+        """(n,) instants [s] on the record's own clock."""
+        return self._time
+
+    @property
+    def force(self) -> Channel | None:
+        """(n, measured dofs) applied force, or None."""
+        return self._samples("force")
+
+    @property
+    def displacement(self) -> Channel | None:
+        """(n, measured dofs) displacement, or None."""
+        return self._samples("displacement")
+
+    @property
+    def velocity(self) -> Channel | None:
+        """(n, measured dofs) velocity, or None."""
+        return self._samples("velocity")
+
+    @property
+    def acceleration(self) -> Channel | None:
+        """(n, measured dofs) acceleration, or None."""
+        return self._samples("acceleration")
+
+    @property
+    def base_acceleration(self) -> Channel | None:
+        """(n,) absolute acceleration of the base, or None."""
+        return self._base_acceleration
+
+    @property
+    def channels(self) -> Mapping[tuple[str, int], Channel]:
+        """Every channel by (kind, dof): force, displacement, velocity, acceleration, each by ascending dof."""
+        return MappingProxyType(
+            {
+                (kind, dof): samples[:, place]
+                for kind, (dofs, samples) in self._columns.items()
+                for place, dof in enumerate(dofs)
+            }
+        )
+
+    @property
+    def responses(self) -> Mapping[tuple[str, int], Channel]:
+        """The channels that are not forces."""
+        return MappingProxyType({key: samples for key, samples in self.channels.items() if key[0] != "force"})
+
+    @property
+    def answers(self) -> Mapping[tuple[str, int], Channel]:
+        """The channels that a simulation has to predict: the responses, or the forces where the motion drives."""
+        if self._drive == "force":
+            return self.responses
+        return MappingProxyType({key: samples for key, samples in self.channels.items() if key[0] == "force"})
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Unit of each kind of channel, also of kinds that were not measured."""
+        return MappingProxyType(self._units)
+
+    @property
+    def dofs(self) -> int:
+        """Highest dof that a channel mentions, 0 without channels."""
+        return max((dofs[-1] for dofs, _ in self._columns.values()), default=0)
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the structure is known to be at rest at the first sample."""
+        return self._at_rest
+
+    @property
+    def drive(self) -> Drive:
+        """What is imposed: "force" or "motion"."""
+        return self._drive
+
+    @property
+    def driven(self) -> bool:
+        """Whether a force, a moving base or an imposed motion drives the structure; it was released otherwise."""
+        forces = (y for (kind, _), y in self.channels.items() if kind == "force")
+        return self.drive == "motion" or self.base_acceleration is not None or any(np.any(y) for y in forces)
+
+    @property
+    def name(self) -> str | None:
+        """What the record is called in a report."""
+        return self._name
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was done to the record or assumed of it, one sentence each."""
+        jitter = self._jitter
+        if not NOTED < jitter <= UNEVEN:
+            return self._notes
+        return (*self._notes, f"Time steps differ by up to {jitter:.2%}; they are treated as uniform.")
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval [s].
+
+        Raises
+        ------
+        ValueError
+            If steps differ from their mean by more than 5 %.
+        """
+        mean = self.duration / (len(self) - 1)
+        if self._jitter > UNEVEN:
+            steps = np.diff(self._time)
+            raise ValueError(
+                f"`time` must have uniform steps (to {UNEVEN:.0%}); they lie between {steps.min():.6g} and "
+                f"{steps.max():.6g} s, {mean:.6g} s on average. Make them so first: "
+                f"record.resample({1 / float(np.median(steps)):.6g})."
+            )
+        return mean
+
+    @property
+    def sample_rate(self) -> float:
+        """Samples per second [Hz]; errors as `dt`."""
+        return 1.0 / self.dt
+
+    @property
+    def duration(self) -> float:
+        """Time from the first sample to the last [s]."""
+        return float(self._time[-1] - self._time[0])
+
+    def __len__(self) -> int:
+        return self._time.size
+
+    def __repr__(self) -> str:
+        measured = ", ".join(f"{kind} {dof}" for kind, dof in self.channels) or "no channel"
+        title = f" {self._name!r}" if self._name else ""
+        return f"<Record{title}: {len(self)} samples over {self.duration:.6g} s; {measured}>"
+
+    def __getitem__(self, samples: slice) -> Self:
+        """The samples of a slice on the same clock, with a note of what was cut off.
+
+        `at_rest` is kept only by a slice that begins at sample 0.
+
+        Raises
+        ------
+        TypeError
+            If `samples` is not a slice.
+        ValueError
+            If its step is not 1, or fewer than two samples remain.
+        """
+        if not isinstance(samples, slice):
+            raise TypeError(
+                f"A record is sliced, record[a:b]; the index was {samples!r}. For values use record.channels."
+            )
+        start, stop, step = samples.indices(len(self))
+        if step != 1:
+            raise ValueError(
+                f"A record is sliced with step 1; it was {step}. To lower the rate: record.resample(rate)."
+            )
+        if stop - start < 2:
+            raise ValueError(
+                f"A slice must keep at least 2 of the {len(self)} samples; record[{start}:{stop}] does not."
+            )
+        columns = {kind: (dofs, values[start:stop]) for kind, (dofs, values) in self._columns.items()}
+        base = None if self._base_acceleration is None else self._base_acceleration[start:stop]
+        time = self._time[start:stop]
+        part = self._with(time, columns, base, at_rest=self._at_rest and start == 0)
+        if len(part) == len(self):
+            return part
+        return part.noted(
+            f"Samples {start} to {stop - 1} of {len(self)} are kept, t = {time[0]:.6g} to {time[-1]:.6g} s."
+        )
+
+    def until(self, time: float) -> Self:
+        """The part up to and including this instant [s]; notes and errors as of a slice."""
+        return self[: int(np.searchsorted(self._time, time, side="right"))]
+
+    def since(self, time: float) -> Self:
+        """The part from this instant [s] on, itself included; notes and errors as of a slice."""
+        return self[int(np.searchsorted(self._time, time, side="left")) :]
+
+    def shifted(self, seconds: float) -> Self:
+        """The same samples on a clock that reads so many seconds [s] more, or less if negative, with a note.
+
+        For a channel that came late by a known time, ``shifted(-late)``, and for a recorder whose clock began anew.
+
+        Raises
+        ------
+        ValueError
+            If `seconds` is not finite.
+        """
+        if not np.isfinite(seconds):
+            raise ValueError(f"`seconds` must be a finite time; it was {seconds}. Pass seconds, as 0.0125.")
+        other = self._with(frozen(self._time + seconds), self._columns, self._base_acceleration, at_rest=self._at_rest)
+        return other.noted(f"The clock was put {'forward' if seconds >= 0 else 'back'} by {abs(seconds):.9g} s.")
+
+    def aligned(self, late: Mapping[tuple[str, int], float]) -> Self:
+        """The record with channels put right that are late by a known time, with a note.
+
+        Between samples a channel is band-limited. Samples that are clipped or torn stay as they are.
+
+        Parameters
+        ----------
+        late : mapping of (kind, dof) to a time
+            How late these channels are [s]; negative where they are early.
+
+        Raises
+        ------
+        ValueError
+            If the record has no such channel, a time is not finite or not shorter than the record, or time is uneven.
+        """
+        columns = {kind: (dofs, values.copy()) for kind, (dofs, values) in self._columns.items()}
+        for channel, seconds in late.items():
+            if channel not in self.channels:
+                raise ValueError(f"`late` names {channel}; the record has {', '.join(map(str, self.channels))}.")
+            if not abs(seconds) < self.duration:
+                raise ValueError(
+                    f"`late` must be shorter than the record of {self.duration:.6g} s; for {channel} it was {seconds}."
+                )
+            kind, j = channel
+            dofs, values = columns[kind]
+            values[:, list(dofs).index(j)] = advanced(self.channels[channel], seconds / self.dt, self.dt)
+        columns = {kind: (dofs, frozen(values)) for kind, (dofs, values) in columns.items()}
+        other = self._with(self._time, columns, self._base_acceleration, at_rest=self._at_rest)
+        return other.noted(*(f"{kind} {j} is read {seconds:.4g} s later." for (kind, j), seconds in late.items()))
+
+    def resample(self, rate: float) -> Self:
+        """The record on a uniform clock of `rate` samples per second [Hz], without aliasing.
+
+        The clock begins at the first instant. Uneven samples are first interpolated by a cubic spline; then every
+        channel passes the same linear-phase filter, so their timing relative to each other is kept.
+
+        Raises
+        ------
+        ValueError
+            If `rate` is not positive, or leaves fewer than two samples.
+        """
+        other, note = self._resampled(rate)
+        return other.noted(note)
+
+    def noted(self, *notes: str) -> Self:
+        """The same record with further notes; those it has are not repeated."""
+        other = self._with(self._time, self._columns, self._base_acceleration, at_rest=self._at_rest)
+        other._notes = tuple(dict.fromkeys((*self._notes, *notes)))
+        return other
+
+    def _samples(self, kind: str) -> Channel | None:
+        return self._columns[kind][1] if kind in self._columns else None
+
+    @property
+    def _jitter(self) -> float:
+        """Largest relative deviation of a step from the mean step."""
+        mean = self.duration / (len(self) - 1)
+        return float(np.max(np.abs(np.diff(self._time) / mean - 1.0)))
+
+    def _resampled(self, rate: float, span: tuple[float, float] | None = None) -> tuple[Self, str]:
+        """The record at `rate` [Hz] over a span of time [s], by default its own, and the note that goes with it."""
+        blocks = [values for _, values in self._columns.values()]
+        if self._base_acceleration is not None:
+            blocks.append(self._base_acceleration[:, None])
+        together = np.concatenate(blocks, axis=1) if blocks else np.empty((len(self), 0))
+        time, values, note = resampled(self._time, together, rate, self._jitter > UNEVEN, span)
+        parts = np.split(values, np.cumsum([block.shape[1] for block in blocks])[:-1], axis=1) if blocks else []
+        columns = {
+            kind: (dofs, frozen(np.asfortranarray(part)))
+            for (kind, (dofs, _)), part in zip(self._columns.items(), parts, strict=False)
+        }
+        base = None if self._base_acceleration is None else frozen(parts[-1][:, 0].copy())
+        return self.noted(*self.notes)._with(frozen(time), columns, base, at_rest=self._at_rest), note
+
+    def _with(self, time: Channel, columns: dict[str, Columns], base: Channel | None, at_rest: bool) -> Self:
+        """The same test with other samples, which are trusted."""
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__)
+        other._time, other._columns, other._base_acceleration, other._at_rest = time, columns, base, at_rest
+        return other
+
+
+AnyRecord = TypeVar("AnyRecord", bound=AbstractRecord)
