@@ -8,24 +8,8 @@ import numpy as np
 from beartype import BeartypeConf, FrozenDict, beartype
 from jaxtyping import AbstractArray
 
-CHECKED = (
-    "jfsm.surrogates",
-    "jfsm.estimation",
-    "jfsm.identification",
-    *(
-        f"jfsm.dynamics.{module}"
-        for module in (
-            "_backbone",
-            "_fixed_points",
-            "_forced_response",
-            "_limit_cycles",
-            "_linearise",
-            "_many",
-            "_simulate",
-        )
-    ),
-)
-"""Rooms, and the modules of `dynamics` with its public functions, whose calls are checked."""
+CHECKED = ("jfsm.surrogates", "jfsm.plant", "jfsm.dynamics", "jfsm.estimation", "jfsm.identification")
+"""Rooms whose calls are checked."""
 
 _NUMBERS = BeartypeConf(
     hint_overrides=FrozenDict({int: int | np.integer, float: float | int | np.floating | np.integer})
