@@ -82,6 +82,9 @@ def test_an_array_without_a_shape_is_seen():
 
         def method(self, fine: Any, plain) -> tuple[float, jax.Array]: ...
 
+        def silent(self): ...
+
     assert list(shapeless(type("Offered", (Offered,), {"__module__": "elsewhere"}))) == []
     Offered.__module__ = "jfsm.here"
-    assert list(shapeless(Offered)) == ["Offered.values", "Offered.method: plain", "Offered.method: return"]
+    found = list(shapeless(Offered))
+    assert found == ["Offered.values", "Offered.method: plain", "Offered.method: return", "Offered.silent: return"]
