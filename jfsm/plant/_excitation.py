@@ -119,7 +119,8 @@ def _fastest_rate(plant: Plant, x: np.ndarray, v: np.ndarray) -> float:
         into, zero, eye = np.linalg.inv(plant.mass), np.zeros((plant.dof,) * 2), np.eye(plant.dof)
         rate = np.block([[zero, eye], [-into @ plant.stiffness, -into @ plant.damping]])
         return float(np.max(np.abs(np.linalg.eigvals(rate))))
-    return float(np.max(np.abs(np.linalg.eigvals(np.asarray(relaxed_jacobian(plant, x, v))))))
+    jacobian = relaxed_jacobian(plant, jnp.asarray(x), jnp.asarray(v))
+    return float(np.max(np.abs(np.linalg.eigvals(np.asarray(jacobian)))))
 
 
 @eqx.filter_jit
@@ -183,7 +184,7 @@ def excitation(
     method: Reconstruction = "band-limited",
     *,
     length: int | None = None,
-    force: Float[Array, "n dof"] | None = None,
+    force: Float[Array, "n dof"] | Float[np.ndarray, "n dof"] | None = None,
     base: Float[np.ndarray, " n"] | None = None,
 ) -> InterpolatedInput:
     """Input of a record on half steps, padded to `length` samples with its last value, which a delayed sensor reads.
