@@ -13,7 +13,8 @@ one lane: `jax.vmap` adds axes that no annotation counts. An axis of one name ha
 `channels`, `places`       of a record; where forces act
 `lanes`, `unknowns`        plants or hypotheses side by side; numbers that are sought
 `points`, `harmonics`      of a branch; of a periodic motion
-`halves`                   half steps of a sample
+`halves`, `reach`          half steps of a sample; samples that a delay buffer holds
+`slots`, `hidden`, `late`  laws of a class in a plant; hidden states; channels that are read late
 =========================  ===============================================================================
 """
 
