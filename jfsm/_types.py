@@ -1,13 +1,39 @@
-"""Array helpers that every room may use: double precision is asked for once, here."""
+"""Array helpers that every room may use: double precision is asked for once, here.
 
-from typing import Any
+Annotations tell the shapes of arrays, and the tests hold every call to them. They are those of one point, one record,
+one lane: `jax.vmap` adds axes that no annotation counts. An axis of one name has one length within a call:
+
+=========================  ===============================================================================
+`n`                        samples of a record, or readings that a map is learned from
+`q`                        points that are asked for
+`dof`, `modes`             degrees of freedom; natural motions
+`state`                    numbers of a state: twice `dof`, with hidden ones where a filter carries them
+`dim`, `outputs`           columns of the states of a map; of its forces
+`nodes`, `basis`           of a map or a table
+`channels`, `places`       of a record; where forces act
+`lanes`, `unknowns`        plants or hypotheses side by side; numbers that are sought
+`points`, `harmonics`      of a branch; of a periodic motion
+`halves`, `reach`          half steps of a sample; samples that a delay buffer holds
+`slots`, `hidden`, `late`  laws of a class in a plant; hidden states; channels that are read late
+=========================  ===============================================================================
+"""
+
+from typing import TYPE_CHECKING, Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Array, Float
+from jaxtyping import Float
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from jaxtyping import Array
+
+    HostArray = np.ndarray
+else:
+    Array = HostArray = jax.Array | np.ndarray | np.generic
+    """Arrays of JAX, for which arrays and numbers of NumPy pass, as they do for JAX; and of NumPy, traced or not."""
 
 X64_MESSAGE = 'float64 data would be narrowed to float32; run `jax.config.update("jax_enable_x64", True)` first.'
 

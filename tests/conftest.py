@@ -6,9 +6,12 @@ from pathlib import Path
 
 import jax
 import pytest
-from jaxtyping import Array, Key
+from checker import CHECKED
+from jaxtyping import Array, Key, install_import_hook
 
-from jfsm._programs import make_room
+install_import_hook(CHECKED, "checker.checked")  # before the first module of jfsm is imported
+
+from jfsm._programs import make_room  # noqa: E402
 
 MOST_MAPS = 25_000
 MOST_KEPT = 2_000_000_000

@@ -7,6 +7,7 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from .._programs import programs_kept
 from .._result import Result
@@ -34,9 +35,9 @@ class Backbone:
         Whether all amplitudes were reached.
     """
 
-    frequency: np.ndarray
-    amplitude: np.ndarray
-    coefficients: np.ndarray
+    frequency: Float[np.ndarray, " points"]
+    amplitude: Float[np.ndarray, " points"]
+    coefficients: Float[np.ndarray, "points harmonics dof"]
     result: Result
 
 

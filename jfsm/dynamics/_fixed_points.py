@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Inexact
 
 from .._types import as_array, require_x64
 from ..structures import MapTerm, Structure
@@ -37,7 +37,7 @@ class FixedPoint:
     ----------
     state : (2 dof,) array
         Displacements [m], then velocities, all zero.
-    eigenvalues : (2 dof,) complex array
+    eigenvalues : (2 dof,) array, complex unless all are real
         Of the motion near it [1/s], the paper's eq. 73.
     stable : bool
         Whether every small disturbance dies out: all real parts negative. Without damping none does.
@@ -45,8 +45,8 @@ class FixedPoint:
         Largest force left over [N].
     """
 
-    state: np.ndarray
-    eigenvalues: np.ndarray
+    state: Float[np.ndarray, " state"]
+    eigenvalues: Inexact[np.ndarray, " state"]
     stable: bool
     residual: float
 

@@ -8,6 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Bool, Float, Int
 from scipy.optimize import brentq
 
 from .._programs import programs_kept
@@ -52,15 +53,15 @@ class ForcedResponse:
         Whether the curve reached an end of the range.
     """
 
-    frequency: np.ndarray
-    amplitude: np.ndarray
-    phase: np.ndarray
-    stable: np.ndarray
-    coefficients: np.ndarray
-    folds: np.ndarray
+    frequency: Float[np.ndarray, " points"]
+    amplitude: Float[np.ndarray, "points dof"]
+    phase: Float[np.ndarray, "points dof"]
+    stable: Bool[np.ndarray, " points"]
+    coefficients: Float[np.ndarray, "points harmonics dof"]
+    folds: Int[np.ndarray, " folds"]
     result: Result
 
-    def motion(self, point: int, samples: int = 256) -> np.ndarray:
+    def motion(self, point: int, samples: int = 256) -> Float[np.ndarray, "samples dof"]:
         """Displacements (samples, dof) over one period of a point, evenly spaced from where the force is largest."""
         harmonics = self.coefficients.shape[1] // 2
         return tables(harmonics, samples)[0] @ self.coefficients[point]

@@ -9,7 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Inexact
 from scipy.interpolate import KroghInterpolator
 from scipy.optimize import brentq
 
@@ -55,7 +55,7 @@ class LimitCycle:
         [s].
     amplitude : (dof,) array
         Half the distance between the turning points of each displacement [m].
-    multipliers : (2 dof,) complex array
+    multipliers : (2 dof,) array, complex unless all are real
         Floquet multipliers, what a period makes of small disturbances, by falling size. One is 1: a shift in time.
     stable : bool
         Whether all others are smaller than 1.
@@ -69,10 +69,10 @@ class LimitCycle:
     """
 
     period: float
-    amplitude: np.ndarray
-    multipliers: np.ndarray
+    amplitude: Float[np.ndarray, " dof"]
+    multipliers: Inexact[np.ndarray, " state"]
     stable: bool
-    orbit: np.ndarray
+    orbit: Float[np.ndarray, "samples columns"]
     residual: float
     note: str
 

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Inexact
 
 from .._types import as_array, require_x64
 from ..plant import state_matrix
@@ -23,27 +23,27 @@ class Linearisation:
     ----------
     matrix : (2 dof, 2 dof) array
         Jacobian of the rate of the state.
-    eigenvalues : (2 dof,) complex array
+    eigenvalues : (2 dof,) array, complex unless all are real
         Of `matrix` [1/s], by size.
     frequencies : (modes,) array
         Natural frequencies [rad/s]: the size of each eigenvalue of imaginary part zero or more, ascending. An
         oscillating mode has one; an overdamped or unstable one that does not oscillate has two, real.
     damping_ratios : (modes,) array
         -Re λ/abs(λ): 1 or -1 where a mode does not oscillate, negative where it grows.
-    shapes : (dof, modes) complex array
+    shapes : (dof, modes) array, complex unless all eigenvalues are real
         Displacement of each mode, in its column; the largest component is 1.
     mass, stiffness, damping : (dof, dof) arrays
         Of the structure for small motion [kg], [N/m], [N s/m].
     """
 
-    matrix: np.ndarray
-    eigenvalues: np.ndarray
-    frequencies: np.ndarray
-    damping_ratios: np.ndarray
-    shapes: np.ndarray
-    mass: np.ndarray
-    stiffness: np.ndarray
-    damping: np.ndarray
+    matrix: Float[np.ndarray, "state state"]
+    eigenvalues: Inexact[np.ndarray, " state"]
+    frequencies: Float[np.ndarray, " modes"]
+    damping_ratios: Float[np.ndarray, " modes"]
+    shapes: Inexact[np.ndarray, "dof modes"]
+    mass: Float[np.ndarray, "dof dof"]
+    stiffness: Float[np.ndarray, "dof dof"]
+    damping: Float[np.ndarray, "dof dof"]
 
 
 def linearise(model: Structure, state: Any = None) -> Linearisation:

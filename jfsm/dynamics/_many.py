@@ -8,6 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from .._programs import programs_kept
 from .._threads import side_by_side
@@ -53,11 +54,11 @@ class Responses:
         Instant [s] at which a run left every bound; infinite for one that did not.
     """
 
-    time: np.ndarray
-    displacement: np.ndarray
-    velocity: np.ndarray
-    acceleration: np.ndarray
-    escape_time: np.ndarray
+    time: Float[np.ndarray, " n"]
+    displacement: Float[np.ndarray, "runs n dof"]
+    velocity: Float[np.ndarray, "runs n dof"]
+    acceleration: Float[np.ndarray, "runs n dof"]
+    escape_time: Float[np.ndarray, " runs"]
 
 
 @programs_kept()

@@ -8,11 +8,12 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 
 from .._programs import programs_kept
 from .._result import Result
-from .._types import as_numbers, is_traced, known, require_x64
+from .._types import HostArray, as_numbers, is_traced, known, require_x64
 from ..plant import (
     Grid,
     InterpolatedInput,
@@ -106,16 +107,16 @@ class Response:
         throughout; else the motion is sensitive, chaotic perhaps, and what follows is one of many motions.
     """
 
-    time: np.ndarray
-    displacement: np.ndarray
-    velocity: np.ndarray
-    acceleration: np.ndarray
+    time: Float[HostArray, " n"]
+    displacement: Float[HostArray, "n dof"]
+    velocity: Float[HostArray, "n dof"]
+    acceleration: Float[HostArray, "n dof"]
     result: Result
     escape_time: float | None
     solver: str
     _sensors: tuple[AbstractSensor, ...]
-    force: np.ndarray | None = None
-    error: np.ndarray | None = None
+    force: Float[HostArray, "n dof"] | None = None
+    error: Float[HostArray, " dof"] | None = None
     agreed_until: float | None = None
 
     @property
@@ -132,7 +133,7 @@ class Response:
             "Compare statistics there, or run shorter stretches from measured states."
         )
 
-    def readings(self, record: Record) -> dict[tuple[str, int], np.ndarray]:
+    def readings(self, record: Record) -> dict[tuple[str, int], Float[np.ndarray, " n"]]:
         """What the sensors of `record` would show, by channel (kind, degree of freedom): their effects applied.
 
         It is the channels of the response; where the motion is imposed, those of the force.

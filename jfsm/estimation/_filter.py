@@ -24,8 +24,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Float, Int
 
+from .._types import Array
 from ..plant import (
     DelayBuffer,
     InterpolatedInput,
@@ -164,11 +165,11 @@ class Assumed(eqx.Module):
     the motion and hidden states at the first sample.
     """
 
-    variance: Float[Array, " channels"]
-    wander: Float[Array, "wandering 2"]
-    colour: Float[Array, "coloured 2"]
-    velocity: Float[Array, "dof dof"]
-    start: Float[Array, "state state"]
+    variance: Float[Array, "*lanes channels"]
+    wander: Float[Array, "*lanes wandering 2"]
+    colour: Float[Array, "*lanes coloured 2"]
+    velocity: Float[Array, "*lanes dof dof"]
+    start: Float[Array, "*lanes state state"]
     wandering: tuple[int, ...] = eqx.field(static=True)
     coloured: tuple[int, ...] = eqx.field(static=True)
 
@@ -247,7 +248,9 @@ class Known(NamedTuple):
         )
 
 
-def begun(plant: Plant, assumed: Assumed, x0, v0, force: Float[Array, "3 dof"], base: Float[Array, " 3"], time, step):
+def begun(
+    plant: Plant, assumed: Assumed, x0, v0, force: Float[Array, "halves dof"], base: Float[Array, " halves"], time, step
+):
     """State of a lane before its first sample, which begins with these forces; hidden states are relaxed."""
     motion, buffer = begin(
         plant, inverse_mass(plant), x0, v0, InterpolatedInput(force[None], base[None], time[None], step)

@@ -7,8 +7,9 @@ it, so that the innovations are white where the structure is right.
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from .._types import Array
 from ..plant import Imposed, Observation, Plant, needed
 from ._filter import Innovations, ProcessNoise, Readings
 

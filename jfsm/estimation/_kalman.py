@@ -9,8 +9,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from .._types import Array
 from ._measurement_update import measurement_update
 
 _LEAST_SWELL = 1e-4

@@ -15,9 +15,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
-from jaxtyping import Array, Float
+from jaxtyping import ArrayLike, Bool, Float, Shaped
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
+from .._types import Array
 from ..plant import InterpolatedInput, Observation, Plant, bucket, force_along, shifted, undelayed
 from ._kalman import LinearModel, log_likelihood, smoothed, swell_of
 
@@ -46,11 +47,11 @@ class Latent:
         Whether anything moved within half a period, beyond the error of its velocity.
     """
 
-    displacement: np.ndarray
-    velocity: np.ndarray
-    force: np.ndarray
-    std: np.ndarray
-    moves: np.ndarray
+    displacement: Float[np.ndarray, "n dof"]
+    velocity: Float[np.ndarray, "n dof"]
+    force: Float[np.ndarray, "n dof"]
+    std: Float[np.ndarray, "n dof"]
+    moves: Bool[np.ndarray, " n"]
 
 
 class _Model(NamedTuple):
@@ -65,10 +66,10 @@ def latent_force(
     plant: Plant,
     observation: Observation,
     inputs: InterpolatedInput,
-    values,
-    use,
-    variance,
-    force_covariance,
+    values: Float[ArrayLike, "n channels"],
+    use: Shaped[ArrayLike, "n channels"],
+    variance: Float[ArrayLike, " channels"],
+    force_covariance: Float[ArrayLike, "dof dof"],
     omega: float,
     length: float,
 ) -> Latent:
@@ -86,7 +87,7 @@ def latent_force(
     omega, length : float
         Angular frequency [rad/s] and size of the motion.
     """
-    n, dt = len(values), float(inputs.step)
+    n, dt = np.shape(values)[0], float(inputs.step)
     padded = min(bucket(n), inputs.time.shape[0])  # nothing is read where it is filled up
     values, use = (np.pad(np.asarray(q), ((0, padded - n), (0, 0))) for q in (values, use))
     base = np.asarray(inputs.base)[:padded]

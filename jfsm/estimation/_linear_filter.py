@@ -13,8 +13,9 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Bool, Float, Int
 
+from .._types import Array
 from ..plant import Observation, Plant, inverse_mass, times
 from ._filter import Assumed, Known, beside, short_transition, transition, zeros_of
 from ._measurement_update import measurement_update

@@ -7,8 +7,9 @@ import jax
 import jax.numpy as jnp
 from jax.lax.linalg import cholesky
 from jax.scipy.linalg import solve_triangular
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from .._types import Array
 from ..surrogates.kriging.correlations import AbstractCorrelation
 from ..surrogates.kriging.trend import TrendBasis
 from ._kalman import Filtered, told_by

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from .._programs import programs_kept
 from .._types import require_x64
@@ -53,21 +54,21 @@ class Motion:
         opposite sign.
     """
 
-    time: np.ndarray
-    displacement: np.ndarray
-    velocity: np.ndarray
-    acceleration: np.ndarray
-    covariance: np.ndarray
-    noise: dict[str, np.ndarray]
+    time: Float[np.ndarray, " n"]
+    displacement: Float[np.ndarray, "n dof"]
+    velocity: Float[np.ndarray, "n dof"]
+    acceleration: Float[np.ndarray, "n dof"]
+    covariance: Float[np.ndarray, "n dof 3 3"]
+    noise: dict[str, Float[np.ndarray, " _"]]
     bias: dict[tuple[str, int], float]
-    drift: dict[tuple[str, int], np.ndarray]
-    drift_std: dict[tuple[str, int], np.ndarray]
+    drift: dict[tuple[str, int], Float[np.ndarray, " n"]]
+    drift_std: dict[tuple[str, int], Float[np.ndarray, " n"]]
     places: tuple[Place, ...] = ()
-    latent_force: np.ndarray | None = None
-    latent_force_std: np.ndarray | None = None
+    latent_force: Float[np.ndarray, "n places"] | None = None
+    latent_force_std: Float[np.ndarray, "n places"] | None = None
 
     @property
-    def std(self) -> np.ndarray:
+    def std(self) -> Float[np.ndarray, "n dof 3"]:
         """Standard error (n, dof, 3) of displacement, velocity and acceleration."""
         return np.sqrt(np.maximum(np.diagonal(self.covariance, axis1=2, axis2=3), 0.0))
 

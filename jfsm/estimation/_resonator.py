@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from .._types import Array
 from ._kalman import LinearModel, log_likelihood, smoothed
 
 _BIAS = 0.3

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from .._programs import programs_kept
 from .._types import as_scalar, require_x64
@@ -35,11 +36,11 @@ class RestoringForce:
     """
 
     at: Place
-    time: np.ndarray
-    states: np.ndarray
-    force: np.ndarray
-    std: np.ndarray
-    states_std: np.ndarray
+    time: Float[np.ndarray, " n"]
+    states: Float[np.ndarray, "n 2"]
+    force: Float[np.ndarray, " n"]
+    std: Float[np.ndarray, " n"]
+    states_std: Float[np.ndarray, "n 2"]
     lacking: bool
 
 

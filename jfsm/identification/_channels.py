@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Bool, Float
 
 from ..plant import Channel, force_limits, measured_force
 from ..records import NoiseFloor, Record, bridged, clipped, declipped, defects, noise_floor, spikes, tones
@@ -27,10 +28,10 @@ class ChannelReadings(NamedTuple):
     """Readings (n, channels) without spikes, which of them take part, the standard deviation of each channel's noise,
     whether it is trusted, and notes."""
 
-    values: np.ndarray
-    use: np.ndarray
-    floor: np.ndarray
-    trusted: np.ndarray
+    values: Float[np.ndarray, "n channels"]
+    use: Float[np.ndarray, "n channels"]
+    floor: Float[np.ndarray, " channels"]
+    trusted: Bool[np.ndarray, " channels"]
     notes: list[str]
 
 
@@ -41,7 +42,7 @@ class Driving(NamedTuple):
     sample, and `in_motion` that of white noise as strong as what it leaves where the structure moves.
     """
 
-    samples: np.ndarray
+    samples: Float[np.ndarray, " n"]
     floor: float
     by_sample: float
     in_motion: float
@@ -50,13 +51,13 @@ class Driving(NamedTuple):
 class Forces(NamedTuple):
     """Force samples (n, dof) to run with, and their noise as in `Driving`, each (dof,)."""
 
-    samples: np.ndarray
-    floor: np.ndarray
-    by_sample: np.ndarray
-    in_motion: np.ndarray
+    samples: Float[np.ndarray, "n dof"]
+    floor: Float[np.ndarray, " dof"]
+    by_sample: Float[np.ndarray, " dof"]
+    in_motion: Float[np.ndarray, " dof"]
 
 
-def readings_of(channels: tuple[Channel, ...], values: np.ndarray, dt: float) -> ChannelReadings:
+def readings_of(channels: tuple[Channel, ...], values: Float[np.ndarray, "n channels"], dt: float) -> ChannelReadings:
     """Readings (n, channels) as a likelihood sees them."""
     use, floor, trusted = np.ones_like(values), np.zeros(len(channels)), np.zeros(len(channels), dtype=bool)
     values, spread, notes = values.copy(), spread_of(channels, values), []
@@ -91,7 +92,7 @@ def _noise_floor(samples: np.ndarray, cut: np.ndarray, dt: float) -> NoiseFloor:
     return replace(found, std=found.std / math.sqrt(1.0 - np.mean(cut)))  # arcs that are put back hold none
 
 
-def spread_of(channels: tuple[Channel, ...], values: np.ndarray) -> np.ndarray:
+def spread_of(channels: tuple[Channel, ...], values: Float[np.ndarray, "n channels"]) -> Float[np.ndarray, " channels"]:
     """Standard deviation of each channel; a dead one is refused."""
     spread = np.std(values, axis=0)
     for (kind, j), size in zip(channels, spread, strict=True):
@@ -120,7 +121,7 @@ def forces(record: Record, model: Structure) -> tuple[Forces, list[str]]:
     return Forces(force, std, by_sample, in_motion), notes
 
 
-def driving(samples: np.ndarray, dt: float) -> Driving:
+def driving(samples: Float[np.ndarray, " n"], dt: float) -> Driving:
     """What drives, as a channel tells it.
 
     Where it is smooth on its own grid, its noise is smoothed away. A spline leaves all of it in the band of the motion,

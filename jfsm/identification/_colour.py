@@ -6,9 +6,10 @@ from typing import Any
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 from scipy.special import expit
 
+from .._types import Array
 from ..estimation._filter import ProcessNoise, Readings
 
 _BEGIN = 1.5
@@ -31,19 +32,19 @@ class Colour(eqx.Module):
     louder: Float[Array, ""]
 
     @classmethod
-    def of(cls, values: np.ndarray, channels: Sequence[int]) -> "Colour":
+    def of(cls, values: Float[np.ndarray, " values"], channels: Sequence[int]) -> "Colour":
         """Colour by its logits and logarithms, those of all channels one after the other."""
         memory, share, variance = values[:-1].reshape(3, len(channels))
         numbers: list[Any] = [expit(memory), expit(share), np.exp(variance), np.exp(values[-1])]
         return cls(tuple(channels), *numbers)
 
     @staticmethod
-    def begin(variance: np.ndarray) -> np.ndarray:
+    def begin(variance: Float[np.ndarray, " coloured"]) -> Float[np.ndarray, " values"]:
         """Values from which noise of this variance (coloured,) climbs."""
         return np.concatenate([np.full(2 * variance.size, _BEGIN), np.log(variance), [0.0]])
 
     @staticmethod
-    def reach(begin: np.ndarray, loudest: float) -> list[tuple[float, float]]:
+    def reach(begin: Float[np.ndarray, " values"], loudest: float) -> list[tuple[float, float]]:
         """Bounds of the values from there; the noise of the force is up to `loudest` times as strong."""
         count, far = begin.size // 3, begin[2 * (begin.size // 3) : -1, None] + np.array([-_WITHIN, _WITHIN])
         return [*[_MEMORIES] * count, *[_SHARES] * count, *map(tuple, far.tolist()), (0.0, float(np.log(loudest)))]

@@ -1,11 +1,14 @@
 """What drives a record between its samples, where a sensor is late or another force acts as well; on the host."""
 
 import numpy as np
+from jaxtyping import Float
 
 from ..plant import InterpolatedInput, cubic_weights
 
 
-def between_samples(force: np.ndarray, halves: int, count: int) -> np.ndarray:
+def between_samples(
+    force: Float[np.ndarray, "*lanes n dof"], halves: int, count: int
+) -> Float[np.ndarray, "*lanes samples halves dof"]:
     """Samples of a force (..., n, dof) on the half steps (..., count, halves, dof), straight in between."""
     fill = [(0, 0)] * (force.ndim - 2) + [(0, count + 1 - force.shape[-2]), (0, 0)]
     here = np.pad(force, fill, "edge") if count >= force.shape[-2] else force
@@ -14,7 +17,9 @@ def between_samples(force: np.ndarray, halves: int, count: int) -> np.ndarray:
     return begin + share * (end - begin)
 
 
-def undelayed_force(force: np.ndarray, delay: np.ndarray) -> np.ndarray:
+def undelayed_force(
+    force: Float[np.ndarray, "n halves dof"], delay: Float[np.ndarray, " dof"]
+) -> Float[np.ndarray, "n halves dof"]:
     """Force (n, halves, dof) with the delays of its sensors undone, in samples: that of t is what is read later."""
     n, halves, dof = force.shape
     flat = _in_a_row(force)
@@ -22,7 +27,7 @@ def undelayed_force(force: np.ndarray, delay: np.ndarray) -> np.ndarray:
     return later[np.arange(n)[:, None] * (halves - 1) + np.arange(halves)[None, :]]
 
 
-def forces_before(inputs: InterpolatedInput, tau: float) -> np.ndarray:
+def forces_before(inputs: InterpolatedInput, tau: float) -> Float[np.ndarray, "n 5 drives"]:
     """Forces, and last the acceleration of the base, (n, 5, dof + 1), from each sample back to tau earlier."""
     force, base = np.asarray(inputs.force), np.asarray(inputs.base)
     n, halves, dof = force.shape

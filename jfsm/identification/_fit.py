@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
 
 from .._programs import programs_kept
 from .._result import Result
@@ -131,7 +132,9 @@ def fit(
     return Fit(kept, values, intervals, pairs, words, -float(best.value[lane]), noise, best.results[lane])
 
 
-def sandwich(information: np.ndarray, scatter: np.ndarray) -> np.ndarray:
+def sandwich(
+    information: Float[np.ndarray, "unknowns unknowns"], scatter: Float[np.ndarray, "unknowns unknowns"]
+) -> Float[np.ndarray, "unknowns unknowns"]:
     """Covariance of the estimate: H⁻¹ J H⁻¹ where it is wider than H⁻¹, [1]_ Theorem 3.2.
 
     H is the information, J the covariance of the gradient as the record shows it. They agree where the model is right
@@ -202,7 +205,10 @@ def free_paths(model: Structure, records: Sequence[Nuisances], fixed: Sequence[s
 
 
 def without_small_offsets(
-    structure: Structure, unknowns: Sequence[Unknown], theta: np.ndarray, covariance: np.ndarray
+    structure: Structure,
+    unknowns: Sequence[Unknown],
+    theta: Float[np.ndarray, " unknowns"],
+    covariance: Float[np.ndarray, "unknowns unknowns"],
 ) -> Structure:
     """The structure without the offsets that are not three standard errors from nothing.
 

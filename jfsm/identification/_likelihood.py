@@ -18,8 +18,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Bool, Float, Shaped
 
+from .._types import Array
 from ..estimation._filter import Assumed, Innovations, ProcessNoise, Readings, State, Stretch, begun, on_lanes, run
 from ..estimation._imposed import force_innovations
 from ..plant import DelayBuffer, Imposed, InterpolatedInput, Observation, Plant, jit_with_kernels
@@ -52,25 +53,25 @@ class Slopes(NamedTuple):
     """
 
     value: float
-    root: np.ndarray
-    error: np.ndarray
-    by_error: np.ndarray
-    by_spread: np.ndarray
-    by_share: np.ndarray | None
+    root: Float[np.ndarray, " readings"]
+    error: Float[np.ndarray, " readings"]
+    by_error: Float[np.ndarray, "unknowns readings"]
+    by_spread: Float[np.ndarray, "unknowns readings"]
+    by_share: Float[np.ndarray, "unknowns readings"] | None
 
     @property
-    def gradient(self) -> np.ndarray:
+    def gradient(self) -> Float[np.ndarray, " unknowns"]:
         with np.errstate(all="ignore"):  # a lane that runs away is told by its value
             slope = self.by_error @ self.error + self.by_spread @ self._by_variance
             return slope if self.by_share is None else slope - self.by_share.sum(1)
 
     @property
-    def information(self) -> np.ndarray:
+    def information(self) -> Float[np.ndarray, "unknowns unknowns"]:
         with np.errstate(all="ignore"):
             return _gram(self.by_error) + 0.5 * _gram(self.by_spread)
 
     @property
-    def scatter(self) -> np.ndarray:
+    def scatter(self) -> Float[np.ndarray, "unknowns unknowns"]:
         """Sum of the outer products of the gradients of `_BLOCKS` stretches."""
         scores = self.by_error * self.error + self.by_spread * self._by_variance
         if self.by_share is not None:
@@ -94,7 +95,11 @@ def _gram(rows: np.ndarray) -> np.ndarray:
     return np.sum([piece @ piece.T.copy() for piece in pieces], 0)
 
 
-def value_and_slopes(run: Callable[[np.ndarray], Innovations], theta: np.ndarray, use: np.ndarray) -> Slopes:
+def value_and_slopes(
+    run: Callable[[np.ndarray], Innovations],
+    theta: Float[np.ndarray, " unknowns"],
+    use: Shaped[np.ndarray, "n channels"],
+) -> Slopes:
     """`Slopes` at `theta` (unknowns,) of the readings that `use` (n, channels) counts.
 
     `run` gives the innovations (lanes, n, channels) of some values (lanes, unknowns).
@@ -136,10 +141,10 @@ class Runs(NamedTuple):
     the record has, `push` (lanes, n, dof), if there is any, a force that drives them as well.
     """
 
-    numbers: np.ndarray
-    velocity: np.ndarray
-    use: np.ndarray | None = None
-    push: np.ndarray | None = None
+    numbers: Float[np.ndarray, "lanes numbers"]
+    velocity: Float[np.ndarray, "lanes dof dof"]
+    use: Shaped[np.ndarray, "n channels"] | None = None
+    push: Float[np.ndarray, "lanes n dof"] | None = None
 
     def split(self) -> list["Runs"]:
         """As many at a time as run side by side, the last of them repeated."""

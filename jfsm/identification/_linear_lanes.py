@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Float, Int
 
+from .._types import Array
 from ..estimation._filter import Innovations, few_states
 from ..estimation._linear_filter import Course, Errors, Law, follow
 from ..plant import InterpolatedInput

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Bool, Float
 
 from .._limit import UNLIMITED, Limit
 from .._result import Result
@@ -34,9 +35,9 @@ _LONGEST = 1.0
 class Maximum:
     """Best values of every lane: minus log-posterior, theta, information, and how it ended."""
 
-    value: np.ndarray
-    theta: np.ndarray
-    information: np.ndarray
+    value: Float[np.ndarray, " lanes"]
+    theta: Float[np.ndarray, "lanes unknowns"]
+    information: Float[np.ndarray, "lanes unknowns unknowns"]
     results: tuple[Result, ...]
 
     def evidence(self, lane: int) -> float:
@@ -50,7 +51,7 @@ class Maximum:
 def approach(
     posterior: Posterior,
     ladder: Sequence[float] = LADDER,
-    theta: np.ndarray | None = None,
+    theta: Float[np.ndarray, "lanes unknowns"] | None = None,
     limit: Limit = UNLIMITED,
 ) -> Maximum:
     """Climb with a process noise that forgives unmodelled force, less from rung to rung.
@@ -68,7 +69,7 @@ def approach(
 def rungs(
     posterior: Posterior,
     ladder: Sequence[float] = LADDER,
-    theta: np.ndarray | None = None,
+    theta: Float[np.ndarray, "lanes unknowns"] | None = None,
     limit: Limit = UNLIMITED,
 ) -> Iterator[Maximum]:
     """What `approach` stands on after each rung."""
@@ -104,7 +105,7 @@ def finish(
     return found
 
 
-def settle(posterior: Posterior, theta: np.ndarray, limit: Limit = UNLIMITED) -> Maximum:
+def settle(posterior: Posterior, theta: Float[np.ndarray, " unknowns"], limit: Limit = UNLIMITED) -> Maximum:
     """Climb from values (unknowns,) that are near the top, of a hypothesis with one start."""
     return _climb(posterior, theta[None], 0.0, 25, _ENOUGH, limit=limit)
 
@@ -117,12 +118,12 @@ def maximise(posterior: Posterior) -> Maximum:
 class _Place(NamedTuple):
     """Where the lanes stand: theta, minus log-posterior, its gradient and the information."""
 
-    theta: np.ndarray
-    value: np.ndarray
-    gradient: np.ndarray
-    information: np.ndarray
+    theta: Float[np.ndarray, "lanes unknowns"]
+    value: Float[np.ndarray, " lanes"]
+    gradient: Float[np.ndarray, "lanes unknowns"]
+    information: Float[np.ndarray, "lanes unknowns unknowns"]
 
-    def where(self, chosen: np.ndarray, other: "_Place") -> "_Place":
+    def where(self, chosen: Bool[np.ndarray, " lanes"], other: "_Place") -> "_Place":
         """This place for the chosen lanes, the other for the rest."""
         pairs = zip(self, other, strict=True)
         return _Place(*(np.where(chosen.reshape((-1,) + (1,) * (a.ndim - 1)), a, b) for a, b in pairs))
@@ -130,7 +131,7 @@ class _Place(NamedTuple):
 
 def _climb(
     posterior: Posterior,
-    theta: np.ndarray,
+    theta: Float[np.ndarray, "lanes unknowns"],
     slack: float,
     steps: int,
     enough: float,

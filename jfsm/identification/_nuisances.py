@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any, NamedTuple, cast
 
 import numpy as np
+from jaxtyping import Bool, Float
 
 from ..estimation._filter import ProcessNoise, Readings, Stretch
 from ..plant import (
@@ -56,16 +57,18 @@ class DrivingNoise(NamedTuple):
     for the acceleration of the base, that of white noise as strong as what it leaves where the structure moves.
     """
 
-    by_sample: np.ndarray
-    in_motion: np.ndarray
+    by_sample: Float[np.ndarray, " dof"]
+    in_motion: Float[np.ndarray, " dof"]
     base: float
 
-    def on(self, mass: np.ndarray) -> np.ndarray:
+    def on(self, mass: Float[np.ndarray, "dof dof"]) -> Float[np.ndarray, "dof dof"]:
         """Covariance (dof, dof) of the white forces on these masses: a base moves all through their inertia."""
         inertia = mass.sum(1)
         return np.diag(self.in_motion) + self.base * np.outer(inertia, inertia)
 
-    def shown_by(self, channels: tuple[Channel, ...], floor: np.ndarray, mass: np.ndarray) -> np.ndarray:
+    def shown_by(
+        self, channels: tuple[Channel, ...], floor: Float[np.ndarray, " channels"], mass: Float[np.ndarray, "dof dof"]
+    ) -> Float[np.ndarray, " channels"]:
         """Variance (channels,) of readings of such noise floors: an acceleration is predicted with the force's own
         noise, less what smoothing took."""
         accelerates = np.array([kind == "acceleration" for kind, _ in channels])
@@ -86,7 +89,7 @@ class Nuisances:
         What is imposed: the force (and the base), or the motion.
     spread : (channels,) array
         Standard deviation of each channel's readings.
-    force_floor : (dof,) array
+    force_floor : (dof,) array, empty where the motion is imposed
         Standard deviation of the white noise of the force's samples.
     base_floor : float
         That of the acceleration of the base.
@@ -121,18 +124,18 @@ class Nuisances:
     readings: Readings
     noise: ProcessNoise
     driving: DrivingNoise
-    force_floor: np.ndarray
+    force_floor: Float[np.ndarray, " forces"]
     base_floor: float
-    force_covariance: np.ndarray
-    spread: np.ndarray
-    floor: np.ndarray
-    trusted: np.ndarray
+    force_covariance: Float[np.ndarray, "dof dof"]
+    spread: Float[np.ndarray, " channels"]
+    floor: Float[np.ndarray, " channels"]
+    trusted: Bool[np.ndarray, " channels"]
     length: float
     crest: float
     omega: float
     period: float
-    x0: np.ndarray
-    v0: np.ndarray
+    x0: Float[np.ndarray, " dof"]
+    v0: Float[np.ndarray, " dof"]
     at_rest: bool
     reconstruction: Reconstruction
     notes: tuple[str, ...]
@@ -164,7 +167,7 @@ class Nuisances:
         return bool(np.any(np.std(inertia, axis=0) > min(self.floor[self.judged])))
 
     @property
-    def judged(self) -> np.ndarray:
+    def judged(self) -> Bool[np.ndarray, " channels"]:
         """Which of the channels a hypothesis has to predict."""
         return np.array([channel in self.record.answers for channel in self.channels])
 
@@ -177,7 +180,7 @@ class Nuisances:
         return dict(zip((self.channels[c] for c in self.colour.channels), pairs, strict=True))
 
     @cached_property
-    def coarse(self) -> np.ndarray:
+    def coarse(self) -> Bool[np.ndarray, " channels"]:
         """Which channels (channels,) err by the steps of their digits more than by noise: again the same where the
         motion is."""
         values = np.asarray(self.readings.values)[: self.samples]
@@ -208,7 +211,7 @@ class Nuisances:
             self._heads[n] = self.inputs.head(n), replace(r, values=r.values[:n], use=r.use[:n], valid=r.valid[:n])
         return self._heads[n]
 
-    def showing(self, values: np.ndarray) -> "Nuisances":
+    def showing(self, values: Float[np.ndarray, "n channels"]) -> "Nuisances":
         """The same record, had its channels shown `values` (n, channels)."""
         values = np.pad(values, ((0, self.readings.valid.size - len(values)), (0, 0)))
         return replace(self, readings=replace(self.readings, values=values))

@@ -7,6 +7,7 @@ from typing import Any
 
 import jax
 import numpy as np
+from jaxtyping import Bool, Float, Shaped
 from scipy.optimize import minimize
 
 from ..estimation._filter import Innovations
@@ -73,13 +74,19 @@ class Posterior:
         leaves, tree = jax.tree.flatten([parts[0].plant for parts in self._parts])
         return tree, tuple(leaf.shape for leaf in leaves), self.records[0].readings.zeros
 
-    def initial(self) -> np.ndarray:
+    def initial(self) -> Float[np.ndarray, "lanes unknowns"]:
         """Starting values (lanes, unknowns)."""
         return np.array([[u.theta for u in unknowns] for unknowns in self.hypothesis.unknowns])
 
     def evaluate(
-        self, theta: np.ndarray, slack: float = 0.0, first: bool = False, lanes: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        self,
+        theta: Float[np.ndarray, "lanes unknowns"],
+        slack: float = 0.0,
+        first: bool = False,
+        lanes: Bool[np.ndarray, " lanes"] | None = None,
+    ) -> tuple[
+        Float[np.ndarray, " lanes"], Float[np.ndarray, "lanes unknowns"], Float[np.ndarray, "lanes unknowns unknowns"]
+    ]:
         """Minus log-posterior (lanes,), gradient and information.
 
         `slack` is the share of unmodelled force forgiven, no less than the record's own; of every record only its
@@ -101,12 +108,14 @@ class Posterior:
                 information[lane][np.ix_(mine, mine)] += found.information
         return value, gradient, information
 
-    def values(self, theta: np.ndarray, slack: float = 0.0, first: bool = False) -> np.ndarray:
+    def values(
+        self, theta: Float[np.ndarray, "lanes unknowns"], slack: float = 0.0, first: bool = False
+    ) -> Float[np.ndarray, " lanes"]:
         """Minus log-posterior (lanes,) by itself, infinite where a filter runs away; arguments as of `evaluate`."""
         found = [self._value(one, lane, slack, first) for lane, one in enumerate(theta)]
         return np.nan_to_num(found, nan=math.inf, posinf=math.inf)
 
-    def _value(self, theta: np.ndarray, lane: int, slack: float, first: bool) -> float:
+    def _value(self, theta: Float[np.ndarray, " unknowns"], lane: int, slack: float, first: bool) -> float:
         total = prior(self.hypothesis.unknowns[lane], theta)[0]
         for index, nuisances in enumerate(self.records):
             until, forgiven = self._until(index, first), max(slack, nuisances.forgiven)
@@ -119,7 +128,7 @@ class Posterior:
         """How many samples of a record count."""
         return min(self.until[index], self.records[index].leading) if first else self.until[index]
 
-    def scatter(self, theta: np.ndarray) -> np.ndarray:
+    def scatter(self, theta: Float[np.ndarray, "lanes unknowns"]) -> Float[np.ndarray, "lanes unknowns unknowns"]:
         """Covariance (lanes, unknowns, unknowns) of the gradient as the record itself shows it, from its stretches."""
         total = np.zeros((*theta.shape, theta.shape[1]))
         for index, parts in enumerate(self._parts):
@@ -162,11 +171,11 @@ class Posterior:
 
     def innovations(
         self,
-        theta: np.ndarray,
+        theta: Float[np.ndarray, " unknowns"],
         index: int = 0,
         *,
-        use: np.ndarray | None = None,
-        push: np.ndarray | None = None,
+        use: Shaped[np.ndarray, "n channels"] | None = None,
+        push: Float[np.ndarray, "n dof"] | None = None,
         noise_scales: bool = True,
         slack: float = 0.0,
     ) -> Innovations:
@@ -183,13 +192,13 @@ class Posterior:
 
     def many_innovations(
         self,
-        theta: np.ndarray,
+        theta: Float[np.ndarray, "runs unknowns"],
         index: int = 0,
         *,
-        use: np.ndarray | None = None,
-        push: np.ndarray | None = None,
+        use: Shaped[np.ndarray, "n channels"] | None = None,
+        push: Float[np.ndarray, "runs n dof"] | None = None,
         noise_scales: bool = True,
-        slack: np.ndarray | None = None,
+        slack: Float[np.ndarray, " runs"] | None = None,
     ) -> Innovations:
         """`innovations` (runs, n, channels) at values (runs, unknowns), each with its `push` and its `slack`."""
         nuisances = self.records[index]
@@ -199,12 +208,12 @@ class Posterior:
         loose = np.zeros(len(theta)) if slack is None else slack
         return self._run(values, index, 0, loose, n, masked, push)
 
-    def at_the_floor(self, theta: np.ndarray) -> np.ndarray:
+    def at_the_floor(self, theta: Float[np.ndarray, " unknowns"]) -> Float[np.ndarray, " unknowns"]:
         """The same values (unknowns,), the noise of every channel as strong as it was taken to be."""
         scales = [u.path.startswith("noise@") for u in self.hypothesis.unknowns[0]]
         return np.where(scales, 0.0, theta)
 
-    def colour(self, theta: np.ndarray, channels: Sequence[int], loudest: float) -> Colour:
+    def colour(self, theta: Float[np.ndarray, " unknowns"], channels: Sequence[int], loudest: float) -> Colour:
         """The most likely colour of the noise of these channels at `theta` (unknowns,) of a hypothesis with one start.
 
         It is the same in all records. The noise of the force is up to `loudest` times as strong as it was taken to be.
@@ -244,7 +253,7 @@ class Posterior:
         found = value_and_slopes(run, values, use)
         return found.value, found.gradient
 
-    def structure(self, theta: np.ndarray, lane: int = 0) -> Structure:
+    def structure(self, theta: Float[np.ndarray, " unknowns"], lane: int = 0) -> Structure:
         """The structure with the values of one lane."""
         unknowns = self.hypothesis.unknowns[lane]
         known = self.hypothesis.structures[lane].values()
@@ -354,7 +363,7 @@ def _slot_bucket(structure: Structure) -> int:
     return 1 if count <= 1 else 2 ** math.ceil(math.log2(count))
 
 
-def slackened(nuisances: Nuisances, share: float) -> np.ndarray:
+def slackened(nuisances: Nuisances, share: float) -> Float[np.ndarray, "dof dof"]:
     """Process noise (dof, dof) that also forgives an unmodelled force of `share` of the elastic force."""
     if isinstance(nuisances.inputs, Imposed):
         size = share * np.max(nuisances.spread[nuisances.judged])
@@ -364,7 +373,9 @@ def slackened(nuisances: Nuisances, share: float) -> np.ndarray:
     return known + forgiven * np.eye(len(known))
 
 
-def prior(unknowns: Sequence[Unknown], theta: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+def prior(
+    unknowns: Sequence[Unknown], theta: Float[np.ndarray, " unknowns"]
+) -> tuple[float, Float[np.ndarray, " unknowns"], Float[np.ndarray, " unknowns"]]:
     """Minus log-density of the unknowns beforehand, its gradient and a positive curvature."""
     value, gradient, curvature = 0.0, np.zeros(theta.size), np.zeros(theta.size)
     for k, (u, t) in enumerate(zip(unknowns, theta, strict=True)):

@@ -13,6 +13,7 @@ from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 from scipy.stats import qmc
 
 from ..estimation import Latent, latent_force
@@ -50,9 +51,9 @@ _MODEST = 0.05
 class _Motion(NamedTuple):
     """Displacement and velocity (n, dof) at these times (n,), as many as others have too."""
 
-    x: np.ndarray
-    v: np.ndarray
-    time: np.ndarray
+    x: Float[np.ndarray, "n dof"]
+    v: Float[np.ndarray, "n dof"]
+    time: Float[np.ndarray, " n"]
 
 
 class Placed(NamedTuple):
@@ -398,7 +399,7 @@ def _still_afterwards(latent: Latent, time: np.ndarray) -> _Motion:
     return _Motion(x, v, np.concatenate([time, later]))
 
 
-def forces_of(terms: Sequence[AbstractTerm], latent: Latent, nuisances: Nuisances) -> np.ndarray:
+def forces_of(terms: Sequence[AbstractTerm], latent: Latent, nuisances: Nuisances) -> Float[np.ndarray, "terms n dof"]:
     """Forces (terms, n, dof) of terms of one class at one place along a smoothed motion, no numbers where they run
     away."""
     n = len(latent.force)

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float, Shaped
 
 from ..estimation import Latent
 from ..structures import AbstractTerm, Scale, Structure
@@ -34,8 +35,8 @@ class _Shapes(NamedTuple):
 
     law: AbstractTerm
     rows: list[dict[str, float]]
-    forces: np.ndarray
-    signs: np.ndarray
+    forces: Float[np.ndarray, "shapes samples"]
+    signs: Shaped[np.ndarray, " shapes"]
 
     def sized(self, k: int, size: float) -> AbstractTerm:
         """The term of a shape and its size."""

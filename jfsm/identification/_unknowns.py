@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
 
 from ..plant import Imposed
 from ..structures import AccelerationBias, Offset, Parameter, Preload, Structure
@@ -74,7 +75,7 @@ class Unknown:
         return self.unit * (math.exp(theta) if self.log else 1.0)
 
 
-def values_of(unknowns: Sequence[Unknown], theta: Sequence[float] | np.ndarray) -> list[float]:
+def values_of(unknowns: Sequence[Unknown], theta: Sequence[float] | Float[np.ndarray, " unknowns"]) -> list[float]:
     """The numbers themselves."""
     exponents = {(u.path, u.record): u.value(t) for u, t in zip(unknowns, theta, strict=True)}
     return [u.value(t, exponents[u.tie[0], u.record] if u.tie else 0.0) for u, t in zip(unknowns, theta, strict=True)]
@@ -82,8 +83,8 @@ def values_of(unknowns: Sequence[Unknown], theta: Sequence[float] | np.ndarray) 
 
 def interval(
     unknowns: Sequence[Unknown],
-    theta: np.ndarray,
-    covariance: np.ndarray,
+    theta: Float[np.ndarray, " unknowns"],
+    covariance: Float[np.ndarray, "unknowns unknowns"],
     path: str,
     width: float = 1.96,
     record: int | None = None,

@@ -7,12 +7,13 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
-from .._types import is_traced
+from .._types import Array, is_traced
 from ..records import Record, declipped, silent_forces
 from ..structures import Clipping, LinearDamping, LinearStiffness, Structure
 from ._drive import Reconstruction, reconstruct
-from ._forces import hidden_start
+from ._forces import State, hidden_start
 from ._grid import InterpolatedInput
 from ._plant import Plant, numbers_of
 from ._stepper import inverse_mass, linearised
@@ -73,7 +74,7 @@ def fastest_mode(plant: Plant) -> float:
     return float(np.sqrt(np.max(np.abs(eigenvalues))))
 
 
-def probes(dof: int, size: Size) -> Iterator[tuple[np.ndarray, np.ndarray, float]]:
+def probes(dof: int, size: Size) -> Iterator[tuple[Float[np.ndarray, " dof"], Float[np.ndarray, " dof"], float]]:
     """Displacements and velocities (dof,) at which fast rates are sought, and the largest angle per step there.
 
     Masses move together, and neighbours against each other.
@@ -118,11 +119,12 @@ def _fastest_rate(plant: Plant, x: np.ndarray, v: np.ndarray) -> float:
         into, zero, eye = np.linalg.inv(plant.mass), np.zeros((plant.dof,) * 2), np.eye(plant.dof)
         rate = np.block([[zero, eye], [-into @ plant.stiffness, -into @ plant.damping]])
         return float(np.max(np.abs(np.linalg.eigvals(rate))))
-    return float(np.max(np.abs(np.linalg.eigvals(np.asarray(relaxed_jacobian(plant, x, v))))))
+    jacobian = relaxed_jacobian(plant, jnp.asarray(x), jnp.asarray(v))
+    return float(np.max(np.abs(np.linalg.eigvals(np.asarray(jacobian)))))
 
 
 @eqx.filter_jit
-def relaxed_jacobian(plant: Plant, x, v):
+def relaxed_jacobian(plant: Plant, x: State, v: State) -> Float[Array, "state state"]:
     """Derivative of the rate of the state by the state, hidden states relaxed and friction left out."""
     return linearised(plant, inverse_mass(plant), x, v, hidden_start(plant, x, v), jnp.zeros_like(x), jnp.zeros(()))[1]
 
@@ -150,7 +152,9 @@ def _size(y: np.ndarray) -> float:
     return max(float(np.std(y)), float(np.max(np.abs(y - np.mean(y)))) / _CREST)
 
 
-def measured_force(record: Record, dof: int, clipped_at: Mapping[tuple[str, int], float] | None = None) -> np.ndarray:
+def measured_force(
+    record: Record, dof: int, clipped_at: Mapping[tuple[str, int], float] | None = None
+) -> Float[np.ndarray, "n dof"]:
     """Force samples (n, dof), zero where no force is applied; a channel of noise alone counts as zero.
 
     Arcs beyond the limits `clipped_at`, by channel, are reconstructed.
@@ -180,8 +184,8 @@ def excitation(
     method: Reconstruction = "band-limited",
     *,
     length: int | None = None,
-    force: Any = None,
-    base: np.ndarray | None = None,
+    force: Float[Array, "n dof"] | Float[np.ndarray, "n dof"] | None = None,
+    base: Float[np.ndarray, " n"] | None = None,
 ) -> InterpolatedInput:
     """Input of a record on half steps, padded to `length` samples with its last value, which a delayed sensor reads.
 

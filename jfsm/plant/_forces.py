@@ -7,16 +7,20 @@ are jitted so that a step, which calls them many times, traces them once.
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from .._types import Array
 from ._plant import Plant, hidden_width
 
 State = Float[Array, " dof"]
 Hidden = Float[Array, " hidden"]
+Modes = Float[Array, " slots"]
+Square = Float[Array, "dof dof"]
+Scalar = Float[Array, ""]
 
 
 @eqx.filter_jit
-def smooth_force(plant: Plant, x: State, v: State, z: Hidden, t: Float[Array, ""]) -> State:
+def smooth_force(plant: Plant, x: State, v: State, z: Hidden, t: Scalar) -> State:
     """Restoring force of the linear part, smooth laws, maps and memory laws: no inertia, friction or delayed force."""
     total = jnp.sum(plant.stiffness * x[None, :], 1) + jnp.sum(plant.damping * v[None, :], 1)
     slots = plant.smooth
@@ -35,7 +39,7 @@ def smooth_force(plant: Plant, x: State, v: State, z: Hidden, t: Float[Array, ""
 
 
 @eqx.filter_jit
-def hidden_rate(plant: Plant, x: State, v: State, z: Hidden, t: Float[Array, ""], base: Float[Array, ""]) -> Hidden:
+def hidden_rate(plant: Plant, x: State, v: State, z: Hidden, t: Scalar, base: Scalar) -> Hidden:
     """Rate of the hidden states; `base` is the acceleration of the base."""
 
     def rate(law, d, w, mine):
@@ -68,9 +72,7 @@ def settle(plant: Plant, x: State, z: Hidden) -> Hidden:
 
 
 @eqx.filter_jit
-def friction_limits(
-    plant: Plant, x: State, v: State, t: Float[Array, ""]
-) -> tuple[Float[Array, " slots"], Float[Array, " slots"]]:
+def friction_limits(plant: Plant, x: State, v: State, t: Scalar) -> tuple[Modes, Modes]:
     """Sliding force backward and forward of every friction slot; their bounds while sticking."""
     slots = plant.friction
     limits = []

@@ -6,12 +6,14 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Bool, Float, Int
 
-from .._types import is_traced
-from ._forces import hidden_start
+from .._types import Array, is_traced
+from ._forces import Scalar, Square, State, hidden_start
 from ._plant import Plant
 from ._stepper import Load, Motion, acceleration, advance, inverse_mass, mode_at
+
+Run = Float[Array, "n dof"]
 
 
 class InterpolatedInput(eqx.Module):
@@ -133,7 +135,15 @@ def push(
     return DelayBuffer(buffer.x.at[here].set(x), buffer.v.at[here].set(v), buffer.count + keep)
 
 
-def delayed_force(plant: Plant, minv, motion: Motion, buffer: DelayBuffer, g, time, step) -> Float[Array, "halves dof"]:
+def delayed_force(
+    plant: Plant,
+    minv: Square,
+    motion: Motion,
+    buffer: DelayBuffer,
+    g: Float[Array, "halves dof"],
+    time: Scalar,
+    step: Scalar,
+) -> Float[Array, "halves dof"]:
     """Delayed forces on the half steps of a sample; `g` (halves, dof) is its load.
 
     The buffer is read by cubic Hermite interpolation between samples. A delay shorter than a sample is read off the
@@ -173,7 +183,7 @@ def delayed_force(plant: Plant, minv, motion: Motion, buffer: DelayBuffer, g, ti
     return total
 
 
-def delayed_along(plant: Plant, x, v, time) -> Float[Array, "n dof"]:
+def delayed_along(plant: Plant, x: Run, v: Run, time: Float[Array, " n"]) -> Run:
     """Delayed forces along a given motion (n, dof), at rest before its first sample."""
     n, step, slots = x.shape[0], time[1] - time[0], plant.delayed
     total = jnp.zeros(x.shape)
@@ -199,14 +209,29 @@ def _late_force(plant: Plant, slot: int, d, w, times):
 
 
 def load_of(
-    plant: Plant, minv, motion: Motion, buffer: DelayBuffer, force, base, time, step
+    plant: Plant,
+    minv: Square,
+    motion: Motion,
+    buffer: DelayBuffer,
+    force: Float[Array, "halves dof"],
+    base: Float[Array, " halves"],
+    time: Scalar,
+    step: Scalar,
 ) -> Float[Array, "halves dof"]:
     """Load of a sample on half steps (2 substeps + 1, dof): the true force, less the delayed forces."""
     g = true_force(plant, force, base)
     return g - delayed_force(plant, minv, motion, buffer, g, time, step) if len(plant.delayed) else g
 
 
-def advance_sample(plant: Plant, minv, motion: Motion, force, base, time, step) -> Motion:
+def advance_sample(
+    plant: Plant,
+    minv: Square,
+    motion: Motion,
+    force: Float[Array, "halves dof"],
+    base: Float[Array, " halves"],
+    time: Scalar,
+    step: Scalar,
+) -> Motion:
     """Motion one sample later; `force` (2 substeps + 1, dof) is the load on half steps."""
     substeps = (force.shape[0] - 1) // 2
     h = step / substeps
@@ -224,7 +249,7 @@ def advance_sample(plant: Plant, minv, motion: Motion, force, base, time, step) 
     return jax.lax.scan(body, motion, (forces, bases, jnp.arange(substeps)))[0]
 
 
-def begin(plant: Plant, minv, x0, v0, inputs: InterpolatedInput) -> tuple[Motion, DelayBuffer]:
+def begin(plant: Plant, minv: Square, x0: State, v0: State, inputs: InterpolatedInput) -> tuple[Motion, DelayBuffer]:
     """Motion and delay buffer at the first sample; hidden states are relaxed."""
     z0, buffer = hidden_start(plant, x0, v0), delay_buffer(plant, x0)
     resting = Motion(x0, v0, z0, jnp.zeros(len(plant.friction)))
@@ -233,13 +258,15 @@ def begin(plant: Plant, minv, x0, v0, inputs: InterpolatedInput) -> tuple[Motion
 
 
 @eqx.filter_jit
-def run_grid(plant: Plant, inputs: InterpolatedInput, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
+def run_grid(plant: Plant, inputs: InterpolatedInput, x0: State, v0: State) -> tuple[Run, Run, Run]:
     """Displacement, velocity and acceleration (relative to the base) at every sample, each (n, dof)."""
     return free_run(plant, inputs, x0, v0)
 
 
 @eqx.filter_jit
-def run_strided(plant: Plant, inputs: InterpolatedInput, stride, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
+def run_strided(
+    plant: Plant, inputs: InterpolatedInput, stride: Int[Array, ""], x0: State, v0: State
+) -> tuple[Run, Run, Run]:
     """As `run_grid`, in steps `stride` times as long; the same program whatever the stride.
 
     The plant must have no delayed forces.
@@ -267,12 +294,14 @@ def run_strided(plant: Plant, inputs: InterpolatedInput, stride, x0: Float[Array
 
 
 @eqx.filter_jit
-def run_again(plant: Plant, inputs: InterpolatedInput, x0: Float[Array, " dof"], v0: Float[Array, " dof"]):
+def run_again(plant: Plant, inputs: InterpolatedInput, x0: State, v0: State) -> tuple[Run, Run, Run]:
     """As `run_grid`, for reverse-mode derivatives: each sample is computed again instead of stored."""
     return free_run(plant, inputs, x0, v0, again=True)
 
 
-def free_run(plant: Plant, inputs: InterpolatedInput, x0, v0, again: bool = False):
+def free_run(
+    plant: Plant, inputs: InterpolatedInput, x0: State, v0: State, again: bool = False
+) -> tuple[Run, Run, Run]:
     """As `run_grid`, to be traced; as `run_again` if `again`."""
     minv = inverse_mass(plant)
     inputs = undelayed(plant, inputs)

@@ -18,11 +18,12 @@ from typing import NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Bool, Float
 from scipy.interpolate import BSpline
 from scipy.linalg import cholesky_banded, solveh_banded
 from scipy.sparse import csr_array, diags_array
 
+from .._types import Array
 from ..records import NoiseFloor, Record, bridged, noise_floor, spikes
 from ..structures import AbstractSensor, AccelerationBias, AccelerationGain, ChannelDelay, Offset, Structure
 from ._excitation import Size, substeps_for
@@ -92,12 +93,12 @@ class Imposed(eqx.Module):
 class _Trace(NamedTuple):
     """`MotionError` of one degree of freedom, and the standard error (n,) of its velocity."""
 
-    rows: np.ndarray
-    enters: np.ndarray
-    follow: np.ndarray
-    fresh: np.ndarray
-    speed_std: np.ndarray
-    start: np.ndarray
+    rows: Float[np.ndarray, "n 3 6"]
+    enters: Bool[np.ndarray, " n"]
+    follow: Float[np.ndarray, "n 5"]
+    fresh: Float[np.ndarray, " n"]
+    speed_std: Float[np.ndarray, " n"]
+    start: Float[np.ndarray, "6 6"]
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,11 @@ class Path:
     errors: tuple[_Trace, ...]
     notes: tuple[str, ...]
 
-    def motion(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def motion(
+        self, time: Float[np.ndarray, "*instants"]
+    ) -> tuple[
+        Float[np.ndarray, "*instants dof"], Float[np.ndarray, "*instants dof"], Float[np.ndarray, "*instants dof"]
+    ]:
         """Displacement, velocity and acceleration (..., dof) at any instants of the record."""
         x, v, a = (np.stack([s(time, nu) for s in self.splines], -1) for nu in range(3))
         return x, v, a

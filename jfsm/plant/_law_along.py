@@ -12,8 +12,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from .._types import Array
 from ..structures import (
     FRICTION_TERMS,
     MEMORY_TERMS,

@@ -10,8 +10,9 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from .._types import Array
 from ._forces import friction_limits, hidden_rate, hidden_start, settle, smooth_force
 from ._grid import delayed_along, shifted
 from ._imposed import Imposed

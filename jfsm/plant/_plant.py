@@ -13,9 +13,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Float, Int
 
-from .._types import is_traced, known
+from .._types import Array, is_traced, known
 from ..structures import (
     DELAYED_TERMS,
     FRICTION_TERMS,
@@ -70,8 +70,8 @@ class Slots(eqx.Module):
     """
 
     kind: Int[Array, " slots"]
-    parameters: Float[Array, "slots width"]
-    direction: Float[Array, "slots dof"]
+    parameters: Float[Array, "*lanes slots width"]
+    direction: Float[Array, "*lanes slots dof"]
     laws: tuple[type, ...] = eqx.field(static=True)
 
     def __len__(self) -> int:
@@ -98,7 +98,9 @@ class Slots(eqx.Module):
         kind = jnp.asarray([present.index(k) for k in kinds], dtype=self.kind.dtype)
         return replace(self, kind=kind, laws=tuple(self.laws[k] for k in present))
 
-    def motion(self, slot: int, x: Float[Array, " dof"], v: Float[Array, " dof"]) -> tuple[Any, Any]:
+    def motion(
+        self, slot: int, x: Float[Array, " dof"], v: Float[Array, " dof"]
+    ) -> tuple[Float[Array, ""], Float[Array, ""]]:
         """Relative displacement and velocity of a slot's link."""
         return jnp.sum(self.direction[slot] * x), jnp.sum(self.direction[slot] * v)
 
@@ -116,23 +118,23 @@ class Plant(eqx.Module):
     `force_delay` and `channel_delay` are empty without delayed sensors: delays have programs of their own.
     `late_channel` holds the channel of each channel delay. Delayed forces reach back at most `reach` samples. With
     `rolled` stages of a step the program is a third smaller, as fast for one motion and its derivatives, and half as
-    fast for many motions.
+    fast for many motions. Plants side by side have a leading axis of lanes on every array but those of whole numbers.
     """
 
-    mass: Float[Array, "dof dof"]
-    damping: Float[Array, "dof dof"]
-    stiffness: Float[Array, "dof dof"]
+    mass: Float[Array, "*lanes dof dof"]
+    damping: Float[Array, "*lanes dof dof"]
+    stiffness: Float[Array, "*lanes dof dof"]
     smooth: Slots
     friction: Slots
     memory: Slots
     delayed: Slots
     maps: tuple[MapSlot, ...]
-    force_gain: Float[Array, " dof"]
-    force_offset: Float[Array, " dof"]
-    channel_gain: Float[Array, " channels"]
-    channel_offset: Float[Array, " channels"]
-    force_delay: Float[Array, " dof_or_none"]
-    channel_delay: Float[Array, " late"]
+    force_gain: Float[Array, "*lanes dof"]
+    force_offset: Float[Array, "*lanes dof"]
+    channel_gain: Float[Array, "*lanes channels"]
+    channel_offset: Float[Array, "*lanes channels"]
+    force_delay: Float[Array, "*lanes dof_or_none"]
+    channel_delay: Float[Array, "*lanes late"]
     late_channel: Int[Array, " late"]
     reach: int = eqx.field(static=True)
     rolled: bool = eqx.field(static=True)
@@ -174,7 +176,7 @@ def observation_of(channels: Sequence[Channel], dof: int) -> Observation:
     return Observation(jnp.asarray(rows), tuple(kind for kind, _ in channels))
 
 
-def direction(at: tuple[int, int], dof: int) -> np.ndarray:
+def direction(at: tuple[int, int], dof: int) -> Float[np.ndarray, " dof"]:
     """Row B of a link: d = x_j - x_i, ground at rest."""
     row = np.zeros(dof)
     for index, sign in ((at[0], -1.0), (at[1], 1.0)):
@@ -183,7 +185,9 @@ def direction(at: tuple[int, int], dof: int) -> np.ndarray:
     return row
 
 
-def state_matrix(stiffness: np.ndarray, damping: np.ndarray) -> np.ndarray:
+def state_matrix(
+    stiffness: Float[np.ndarray, "*lanes dof dof"], damping: Float[np.ndarray, "*lanes dof dof"]
+) -> Float[np.ndarray, "*lanes state state"]:
     """Matrix of y' = matrix y, y = (x, v), from stiffness and damping (..., dof, dof) over the mass."""
     one = np.broadcast_to(np.eye(stiffness.shape[-1]), stiffness.shape)
     return np.block([[np.zeros_like(stiffness), one], [-stiffness, -damping]])

@@ -7,6 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from .._types import as_array
 from ..records import Record
@@ -26,7 +27,7 @@ def starting_state(
     *,
     window: int = 50,
     reconstruction: Reconstruction = "band-limited",
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[Float[np.ndarray, " dof"], Float[np.ndarray, " dof"]]:
     """Displacement and velocity (dof,) at the first sample.
 
     In this order: `initial_state`; rest if the record says so; least squares of the structure over the first `window`

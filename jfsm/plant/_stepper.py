@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Bool, Float
 
-from ._forces import friction_limits, hidden_rate, settle, smooth_force
+from .._types import Array
+from ._forces import Hidden, Modes, Scalar, Square, State, friction_limits, hidden_rate, settle, smooth_force
 from ._plant import Plant
 
 _SEGMENTS = 3
@@ -25,10 +26,10 @@ _SHARED = 1e-10
 class Motion(NamedTuple):
     """State of a run: displacement, velocity, hidden states, and mode of each friction slot."""
 
-    x: Float[Array, " dof"]
-    v: Float[Array, " dof"]
-    z: Float[Array, " hidden"]
-    mode: Float[Array, " slots"]
+    x: State
+    v: State
+    z: Hidden
+    mode: Modes
 
 
 class Load(NamedTuple):
@@ -36,32 +37,34 @@ class Load(NamedTuple):
 
     force: Float[Array, "3 dof"]
     base: Float[Array, " 3"]
-    time: Float[Array, ""]
-    step: Float[Array, ""]
+    time: Scalar
+    step: Scalar
 
-    def at(self, share: Float[Array, ""]) -> Float[Array, " dof"]:
+    def at(self, share: Scalar) -> State:
         """Force at a share of the step, by the parabola through the three values."""
         a, b, c = self.force[0], self.force[1], self.force[2]
         return a + share * (4 * b - 3 * a - c) + share * share * (2 * a + 2 * c - 4 * b)
 
 
-def inverse_mass(plant: Plant) -> Float[Array, "dof dof"]:
+def inverse_mass(plant: Plant) -> Square:
     """Inverse of the mass matrix, formed once per run."""
     return 1.0 / plant.mass if plant.dof == 1 else jnp.linalg.inv(plant.mass)
 
 
-def times(matrix, vector):
+def times(matrix: Float[Array, "rows columns"], vector: Float[Array, " columns"]) -> Float[Array, " rows"]:
     """Product of a small matrix and a vector."""
     # Written as a sum: a matrix product of this size would leave the fused loop of the compiled step.
     return jnp.sum(matrix * vector[None, :], 1)
 
 
-def free_acceleration(plant: Plant, minv, x, v, z, g, t):
+def free_acceleration(plant: Plant, minv: Square, x: State, v: State, z: Hidden, g: State, t: Scalar) -> State:
     """Acceleration without friction."""
     return times(minv, g - smooth_force(plant, x, v, z, t))
 
 
-def linearised(plant: Plant, minv, x, v, z, g, t) -> tuple[Float[Array, " dof"], Float[Array, "state state"]]:
+def linearised(
+    plant: Plant, minv: Square, x: State, v: State, z: Hidden, g: State, t: Scalar
+) -> tuple[State, Float[Array, "state state"]]:
     """Acceleration without friction, and derivative of the rate of (x, v, z) by (x, v, z), the base at rest."""
     dof = plant.dof
 
@@ -76,7 +79,7 @@ def linearised(plant: Plant, minv, x, v, z, g, t) -> tuple[Float[Array, " dof"],
     return rates[dof : 2 * dof], slopes
 
 
-def holding_force(plant: Plant, minv, a, sticking):
+def holding_force(plant: Plant, minv: Square, a: State, sticking: Bool[Array, " slots"]) -> Modes:
     """Friction forces that keep the sticking links from moving, given the acceleration `a` without them."""
     rows = plant.friction.direction
     need = jnp.sum(rows * a[None, :], 1)
@@ -101,12 +104,16 @@ def _solved(matrix, right):
     return right
 
 
-def acceleration(plant: Plant, minv, x, v, z, mode, g, t):
+def acceleration(
+    plant: Plant, minv: Square, x: State, v: State, z: Hidden, mode: Modes, g: State, t: Scalar
+) -> tuple[State, Modes]:
     """Acceleration in the given mode, and the margin of each friction slot: negative once its mode has ended."""
     return with_friction(plant, minv, x, v, mode, free_acceleration(plant, minv, x, v, z, g, t), t)
 
 
-def with_friction(plant: Plant, minv, x, v, mode, a, t):
+def with_friction(
+    plant: Plant, minv: Square, x: State, v: State, mode: Modes, a: State, t: Scalar
+) -> tuple[State, Modes]:
     """`acceleration`, from the one without friction."""
     if not len(plant.friction):
         return a, mode
@@ -120,7 +127,16 @@ def with_friction(plant: Plant, minv, x, v, mode, a, t):
     return a, margin
 
 
-def mode_at(plant: Plant, minv, x, v, z, g, t, still: Array | bool = False):
+def mode_at(
+    plant: Plant,
+    minv: Square,
+    x: State,
+    v: State,
+    z: Hidden,
+    g: State,
+    t: Scalar,
+    still: Bool[Array, " slots"] | bool = False,
+) -> Modes:
     """Mode of each friction slot in a state: the sign of its speed; at rest, 0 or the sign of its breakaway.
 
     Slots that are known to be `still` are at rest whatever rounding made of their speeds.
@@ -193,7 +209,7 @@ def _in_mode(plant: Plant, minv, x, v, z, mode, load: Load, start, share):
     return x, v, settle(plant, x, z)
 
 
-def advance(plant: Plant, minv, motion: Motion, load: Load) -> Motion:
+def advance(plant: Plant, minv: Square, motion: Motion, load: Load) -> Motion:
     """Motion at the end of one step."""
     end = in_mode(plant, minv, motion, load)
     if not len(plant.friction):
@@ -202,17 +218,17 @@ def advance(plant: Plant, minv, motion: Motion, load: Load) -> Motion:
     return jax.lax.cond(over, lambda: through_events(plant, minv, motion, end, load), lambda: end)
 
 
-def in_mode(plant: Plant, minv, motion: Motion, load: Load) -> Motion:
+def in_mode(plant: Plant, minv: Square, motion: Motion, load: Load) -> Motion:
     """Motion at the end of one step, had no mode ended in it."""
     return Motion(*_in_mode(plant, minv, *motion, load, jnp.zeros(()), jnp.ones(())), motion.mode)
 
 
-def any_ended(plant: Plant, minv, end: Motion, load: Load) -> Array:
+def any_ended(plant: Plant, minv: Square, end: Motion, load: Load) -> Bool[Array, ""]:
     """Whether any mode has ended before the `end` of a step."""
     return jnp.any(acceleration(plant, minv, *end, load.force[2], load.time + load.step)[1] < 0)
 
 
-def through_events(plant: Plant, minv, motion: Motion, end: Motion, load: Load) -> Motion:
+def through_events(plant: Plant, minv: Square, motion: Motion, end: Motion, load: Load) -> Motion:
     """Motion at the end of a step in which modes end; `end` is where the first of them would lead."""
     rows, one = plant.friction.direction, jnp.ones(())
 
@@ -240,7 +256,7 @@ def through_events(plant: Plant, minv, motion: Motion, end: Motion, load: Load) 
     return end
 
 
-def stopping(minv, rows, speed, stopped):
+def stopping(minv: Square, rows: Float[Array, "slots dof"], speed: Modes, stopped: Bool[Array, " slots"]) -> State:
     """Velocity that must go for the stopped links to be at rest exactly."""
     effect = jnp.sum(minv[None, :, :] * rows[:, None, :], 2)
     scale = jnp.sum(rows * effect, 1)

@@ -35,32 +35,32 @@ class AbstractForceStateMap(eqx.Module):
         """Lowest and highest visited value of each column."""
 
     @abc.abstractmethod
-    def __call__(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
+    def __call__(self, state: ArrayLike) -> Float[Array, "*outputs"]:
         """Restoring force at one state."""
 
     @abc.abstractmethod
-    def gradient(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs dim"]:
+    def gradient(self, state: ArrayLike) -> Float[Array, "*outputs dim"]:
         """First derivatives of the restoring force at one state."""
 
     @abc.abstractmethod
-    def derivative(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
+    def derivative(self, state: ArrayLike, orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
         """Mixed derivative at one state; ``orders=(3, 0)`` is the third one in the first column."""
 
     @abc.abstractmethod
-    def std(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
+    def std(self, state: ArrayLike) -> Float[Array, "*outputs"]:
         """Standard error of the restoring force at one state, in its unit."""
 
     @abc.abstractmethod
     def evaluate_derivatives(
-        self, states: Float[ArrayLike, "q dim"], orders: Sequence[tuple[int, ...]]
+        self, states: ArrayLike, orders: Sequence[tuple[int, ...]]
     ) -> Float[Array, "q derivatives *outputs"]:
         """Several derivatives at many states at once; orders of zero mean the force itself."""
 
     @abc.abstractmethod
-    def visited(self, states: Float[ArrayLike, "q dim"]) -> Bool[NDArray[np.bool_], " q"]:
+    def visited(self, states: ArrayLike) -> Bool[NDArray[np.bool_], " q"]:
         """Whether each state lies where readings were taken; elsewhere the map extrapolates."""
 
-    def evaluate(self, states: Float[ArrayLike, "q dim"]) -> Float[Array, "q *outputs"]:
+    def evaluate(self, states: ArrayLike) -> Float[Array, "q *outputs"]:
         """Restoring force at many states: the fast path, which may search neighbours on the host."""
         return self.evaluate_derivatives(states, ((0,) * self.dim,))[:, 0]
 

@@ -12,7 +12,7 @@ import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, BinaryIO, Literal
+from typing import Any, BinaryIO, Literal, no_type_check
 
 import jax
 import jax.numpy as jnp
@@ -149,6 +149,7 @@ def _taken_apart(value: Any, path: str, arrays: dict[str, NDArray[Any]]) -> Any:
     return {"class": name, **parts}
 
 
+@no_type_check  # or its axes would be its own under the tests
 def _put_together(form: Any, path: str, arrays: dict[str, NDArray[Any]]) -> Any:
     """The part that `form` tells of, with its arrays, which are taken out of `arrays`."""
     if form is None:
@@ -180,6 +181,7 @@ def _array(values: NDArray[Any]) -> jax.Array:
     return jnp.asarray(values)
 
 
+@no_type_check  # or its axes would be its own under the tests
 def _fits(value: Any, kind: Any) -> bool:
     """Whether a part is what its class says of it."""
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)

@@ -27,7 +27,7 @@ class AbstractScatteredMap(AbstractForceStateMap):
     def box(self) -> Float[Array, "2 dim"]:
         return jnp.stack([jnp.min(self.nodes.states, axis=0), jnp.max(self.nodes.states, axis=0)])
 
-    def visited(self, states: Float[ArrayLike, "q dim"]) -> Bool[NDArray[np.bool_], " q"]:
+    def visited(self, states: ArrayLike) -> Bool[NDArray[np.bool_], " q"]:
         """Whether each state has a node within `Nodes.reach`.
 
         Elsewhere the map extrapolates, with errors 10 to 100 times larger.

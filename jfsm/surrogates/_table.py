@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, ArrayLike, Bool, Float
 
 from .._types import as_array
 from ..structures import MapTerm
@@ -33,7 +33,7 @@ class HermiteTable(eqx.Module):
     box_error: Float[Array, ""]
     """The same at all midpoints, where the map extrapolates too."""
 
-    def __call__(self, d: Float[Array, "..."], w: Float[Array, ""] | None = None) -> Float[Array, ""]:
+    def __call__(self, d: Float[ArrayLike, "..."], w: Float[ArrayLike, ""] | None = None) -> Float[Array, ""]:
         """Force at displacement `d` and velocity `w`; `d` alone may be a state (2,), as for any map."""
         state = jnp.asarray(d) if w is None else jnp.stack([d, w])
         return _interpolate(self.jets, self.lower, self.step, state)

@@ -61,27 +61,27 @@ class MovingLeastSquares(AbstractScatteredMap):
     def nodes(self) -> Nodes:
         return self.values.nodes
 
-    def __call__(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
+    def __call__(self, state: ArrayLike) -> Float[Array, "*outputs"]:
         """Restoring force at one state; a RuntimeError where the nodes around it are in degenerate position."""
         return self.values(state)
 
-    def gradient(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs dim"]:
+    def gradient(self, state: ArrayLike) -> Float[Array, "*outputs dim"]:
         """First derivatives of the map at one state."""
         return _gradient(self.values, self._state(state))
 
-    def derivative(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
+    def derivative(self, state: ArrayLike, orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
         """Derivative of the map at one state; ``orders=(2, 0)`` is the second one in the first column.
 
         The window has two continuous derivatives: from the third on they jump at the edge of every node's support.
         """
         return _derivative(self.values, self._state(state), self._orders(orders, self.values.rule.order))
 
-    def std(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
+    def std(self, state: ArrayLike) -> Float[Array, "*outputs"]:
         """Standard error of the force at one state, as `RKPM.std`."""
         return self.values.std(state)
 
     def evaluate_derivatives(
-        self, states: Float[ArrayLike, "q dim"], orders: Sequence[MultiIndex]
+        self, states: ArrayLike, orders: Sequence[MultiIndex]
     ) -> Float[Array, "q derivatives *outputs"]:
         """Several derivatives at many states; the force itself is evaluated as fast as that of `RKPM`."""
         checked = [self._orders(one, self.values.rule.order) for one in orders]

@@ -52,24 +52,24 @@ class Polynomial(AbstractScatteredMap):
         nodes = prepare_nodes(states, force, order)
         return cls(nodes, order, *_least_squares(nodes, order))
 
-    def __call__(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
+    def __call__(self, state: ArrayLike) -> Float[Array, "*outputs"]:
         """Restoring force at one state."""
         return _derivative(self, self._state(state), (0,) * self.dim)
 
-    def gradient(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs dim"]:
+    def gradient(self, state: ArrayLike) -> Float[Array, "*outputs dim"]:
         """First derivatives of the polynomial at one state."""
         return jnp.stack([_derivative(self, self._state(state), axis) for axis in first_derivatives(self.dim)], axis=-1)
 
-    def derivative(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
+    def derivative(self, state: ArrayLike, orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
         """Derivative of the polynomial at one state."""
         return _derivative(self, self._state(state), self._orders(orders, self.order))
 
-    def std(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
+    def std(self, state: ArrayLike) -> Float[Array, "*outputs"]:
         """Standard error of the force at one state, from the scatter of all readings about the polynomial."""
         return _standard_error(self, self._state(state))
 
     def evaluate_derivatives(
-        self, states: Float[ArrayLike, "q dim"], orders: Sequence[MultiIndex]
+        self, states: ArrayLike, orders: Sequence[MultiIndex]
     ) -> Float[Array, "q derivatives *outputs"]:
         """Several derivatives at many states."""
         checked = [self._orders(one, self.order) for one in orders]

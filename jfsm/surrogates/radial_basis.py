@@ -78,19 +78,19 @@ class RadialBasis(AbstractScatteredMap):
             raise ValueError(f"`smoothing` must not be negative; got {ridge:g}.")
         return cls(nodes, order, neighbours, ridge)
 
-    def __call__(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
+    def __call__(self, state: ArrayLike) -> Float[Array, "*outputs"]:
         """Restoring force at one state."""
         return _derivatives(self, self._state(state), ((0,) * self.dim,))[0]
 
-    def gradient(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs dim"]:
+    def gradient(self, state: ArrayLike) -> Float[Array, "*outputs dim"]:
         """First derivatives of the local spline at one state."""
         return jnp.moveaxis(_derivatives(self, self._state(state), first_derivatives(self.dim)), 0, -1)
 
-    def derivative(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
+    def derivative(self, state: ArrayLike, orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
         """Derivative of the local spline at one state; its orders sum to the map's order at most."""
         return _derivatives(self, self._state(state), (self._orders(orders, self.order),))[0]
 
-    def std(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
+    def std(self, state: ArrayLike) -> Float[Array, "*outputs"]:
         """Standard error of the force at one state.
 
         Notes
@@ -109,7 +109,7 @@ class RadialBasis(AbstractScatteredMap):
         return _standard_error(self, self._state(state))
 
     def evaluate_derivatives(
-        self, states: Float[ArrayLike, "q dim"], orders: Sequence[MultiIndex]
+        self, states: ArrayLike, orders: Sequence[MultiIndex]
     ) -> Float[Array, "q derivatives *outputs"]:
         """Several derivatives at many states: one local system each serves all of them."""
         checked = tuple(self._orders(one, self.order) for one in orders)

@@ -68,7 +68,7 @@ class Weighed:
         return self.maps[key] if has_map(key) else self._trials[key]
 
     def gain(self, decision: Decision) -> tuple[Gain | None, list[dict]]:
-        """Gain of what is handed out over the model as stated, and the runs behind it; none where nothing is held out."""
+        """Gain of what is handed out over the model as stated, and the runs behind it, if anything is held out."""
         key = self._handed_out(decision)
         self._held_out(key)
         return self.runs.get(key, (None, []))

@@ -77,12 +77,17 @@ def _fitted(selection: Mapping[str, Cause], *, imposed: bool) -> list[Cause]:
 
 def _links(cause: Cause, model: Structure, places: Sequence[tuple] | None) -> list[tuple]:
     """Places of a law: the links; the masses if it hangs on one or loads it from outside."""
+    if cause.effect in (LinearStiffness, LinearDamping):
+        return _among(places, _without(cause.effect, model))
     masses = [(0, j) for j in range(1, model.dof + 1)]
     if cause.effect.hangs:
-        return [at for at in masses if places is None or at in places]
-    if cause.effect in (LinearStiffness, LinearDamping):
-        return [at for at in _without(cause.effect, model) if places is None or at in places]
+        return _among(places, masses)
     return list(places if places is not None else masses if cause.family == "input" else model.links)
+
+
+def _among(places: Sequence[tuple] | None, possible: Sequence[tuple]) -> list[tuple]:
+    """The possible places that were asked for; all of them where none were."""
+    return [at for at in possible if places is None or at in places]
 
 
 def _without(kind: type, model: Structure) -> list[tuple[int, int]]:

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Array, ArrayLike, Bool, Float
+from jaxtyping import Array, ArrayLike, Bool, Float, PRNGKeyArray
 from numpy.typing import NDArray
 
 from ..._types import as_array, is_traced, require_x64
@@ -165,9 +165,9 @@ class Kriging(AbstractForceStateMap):
 
     @staticmethod
     def negative_log_likelihood(
-        log_parameters: Float[ArrayLike, " parameters"],
-        states: Float[ArrayLike, "n dim"],
-        force: Float[ArrayLike, "n *outputs"],
+        log_parameters: ArrayLike,
+        states: ArrayLike,
+        force: ArrayLike,
         correlation: AbstractCorrelation | None = None,
         trend: str | PolynomialTrend = "quadratic",
         restricted: bool = False,
@@ -192,9 +192,9 @@ class Kriging(AbstractForceStateMap):
 
     @staticmethod
     def leave_one_out_errors(
-        log_parameters: Float[ArrayLike, " parameters"],
-        states: Float[ArrayLike, "n dim"],
-        force: Float[ArrayLike, "n *outputs"],
+        log_parameters: ArrayLike,
+        states: ArrayLike,
+        force: ArrayLike,
         correlation: AbstractCorrelation | None = None,
         trend: str | PolynomialTrend = "quadratic",
     ) -> Float[Array, "n *outputs"]:
@@ -270,15 +270,15 @@ class Kriging(AbstractForceStateMap):
             found.append(self._joined(rows))
         return jnp.stack(found)
 
-    def __call__(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
+    def __call__(self, state: ArrayLike) -> Float[Array, "*outputs"]:
         """Restoring force at one state, eq. 69."""
         return self._derivatives(self._state(state)[None], (self._value,))[0, 0]
 
-    def gradient(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs dim"]:
+    def gradient(self, state: ArrayLike) -> Float[Array, "*outputs dim"]:
         """First derivatives of the map at one state."""
         return jnp.moveaxis(self._derivatives(self._state(state)[None], first_derivatives(self.dim))[0], 0, -1)
 
-    def derivative(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
+    def derivative(self, state: ArrayLike, orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
         """Derivative of the map at one state, from the derivative of the correlation; ``orders=(1, 1)`` is ∂²f/∂x∂v.
 
         Raises
@@ -289,7 +289,7 @@ class Kriging(AbstractForceStateMap):
         """
         return self._derivatives(self._state(state)[None], (self._orders(orders),))[0, 0]
 
-    def std(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...] | None = None) -> Float[Array, "*outputs"]:
+    def std(self, state: ArrayLike, orders: tuple[int, ...] | None = None) -> Float[Array, "*outputs"]:
         """Standard error of the force at one state, or of its derivative; without the noise of a new reading.
 
         The uncertainty of the trend coefficients is in it, that of the hyper-parameters is not.
@@ -302,7 +302,7 @@ class Kriging(AbstractForceStateMap):
         return self._standard_errors(self._state(state)[None], self._field_orders(orders))[0]
 
     def evaluate_derivatives(
-        self, states: Float[ArrayLike, "q dim"], orders: Sequence[tuple[int, ...]]
+        self, states: ArrayLike, orders: Sequence[tuple[int, ...]]
     ) -> Float[Array, "q derivatives *outputs"]:
         """Several derivatives at many states; ``(0, 0)`` among `orders` is the force itself."""
         wanted = tuple(self._orders(one) for one in orders)
@@ -310,16 +310,14 @@ class Kriging(AbstractForceStateMap):
             return self._derivatives(jnp.asarray(states), wanted)
         return self._in_blocks(states, lambda block: self._derivatives(block, wanted), (len(wanted),))
 
-    def evaluate_std(
-        self, states: Float[ArrayLike, "q dim"], orders: tuple[int, ...] | None = None
-    ) -> Float[Array, "q *outputs"]:
+    def evaluate_std(self, states: ArrayLike, orders: tuple[int, ...] | None = None) -> Float[Array, "q *outputs"]:
         """`std` at many states."""
         wanted = self._field_orders(orders)
         if self._traced(states):
             return self._standard_errors(jnp.asarray(states), wanted)
         return self._in_blocks(states, lambda block: self._standard_errors(block, wanted), ())
 
-    def visited(self, states: Float[ArrayLike, "q dim"]) -> Bool[NDArray[np.bool_], " q"]:
+    def visited(self, states: ArrayLike) -> Bool[NDArray[np.bool_], " q"]:
         """Whether each state has a point within `reach`: the distance of 95 in 100 points to a near neighbour."""
         points, scale = _scaled(self.parts[0])
         return within(points, float(self.reach), self._states(states) / scale)
@@ -342,7 +340,7 @@ class Kriging(AbstractForceStateMap):
         residual, std = self._joined([one[0] for one in found]), self._joined_std([one[1] for one in found])
         return LeaveOneOut(np.asarray(residual), np.asarray(std))
 
-    def sample(self, states: Float[ArrayLike, "q dim"], count: int, key: Array) -> Float[Array, "count q *outputs"]:
+    def sample(self, states: ArrayLike, count: int, key: PRNGKeyArray) -> Float[Array, "count q *outputs"]:
         """Force at the states in `count` maps that are as plausible as this one."""
         where = jnp.asarray(self._states(states))
         keys = jax.random.split(key, len(self.parts))

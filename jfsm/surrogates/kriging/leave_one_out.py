@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from jaxtyping import Float
 from scipy.stats import norm
 
 
@@ -19,24 +19,24 @@ class LeaveOneOut:
         Standard error of that difference, noise of the reading included.
     """
 
-    residual: NDArray[np.float64]
-    std: NDArray[np.float64]
+    residual: Float[np.ndarray, "n *outputs"]
+    std: Float[np.ndarray, "n *outputs"]
 
     @property
-    def standardised(self) -> NDArray[np.float64]:
+    def standardised(self) -> Float[np.ndarray, "n *outputs"]:
         """Residual over its standard error: of unit variance if the error bars are right."""
         return self.residual / self.std
 
     @property
-    def rms(self) -> NDArray[np.float64]:
+    def rms(self) -> Float[np.ndarray, "*outputs"] | np.float64:
         """Root mean square of the residual, per output."""
         return np.sqrt(np.mean(self.residual**2, axis=0))
 
     @property
-    def spread(self) -> NDArray[np.float64]:
+    def spread(self) -> Float[np.ndarray, "*outputs"] | np.float64:
         """Root mean square of the standardised residuals: above 1 the error bars are too small, below too large."""
         return np.sqrt(np.mean(self.standardised**2, axis=0))
 
-    def coverage(self, level: float = 0.95) -> NDArray[np.float64]:
+    def coverage(self, level: float = 0.95) -> Float[np.ndarray, "*outputs"] | np.float64:
         """Share of the readings within the interval that should hold a share `level` of them."""
         return np.mean(np.abs(self.standardised) <= norm.ppf(0.5 + level / 2.0), axis=0)

@@ -9,8 +9,9 @@ import jax
 import jax.numpy as jnp
 from jax.lax.linalg import cholesky
 from jax.scipy.linalg import solve_triangular
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
+from ..._types import Array
 from .correlations import AbstractCorrelation
 from .inverse import BLOCK, inverse_columns
 

@@ -10,11 +10,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Array, Float
+from jaxtyping import Float
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from ..._types import is_traced
+from ..._types import Array, is_traced
 from .._blocks import padded_blocks
 from .basis import DerivativeTargets, basis_size
 from .estimates import SINGULAR, Neighbourhood, Rule, basis_at, degenerate_message

@@ -166,9 +166,9 @@ class RKPM(AbstractScatteredMap):
 
     @staticmethod
     def leave_one_out_errors(
-        log_parameters: Float[ArrayLike, " parameters"],
-        states: Float[ArrayLike, "n dim"],
-        force: Float[ArrayLike, "n *outputs"],
+        log_parameters: ArrayLike,
+        states: ArrayLike,
+        force: ArrayLike,
         order: int = 3,
         neighbours: int | None = None,
         window: AbstractWindow | None = None,
@@ -212,12 +212,12 @@ class RKPM(AbstractScatteredMap):
             )
         return _left_out(jnp.asarray(log_parameters), nodes, rule)
 
-    def support(self, states: Float[ArrayLike, "q dim"]) -> Support:
+    def support(self, states: ArrayLike) -> Support:
         """What is done at each state: nodes in the support, dilation, condition, and whether the map extrapolates."""
         states = self._states(states)
         return supports(self.nodes, self.rule, states, self.visited(states))
 
-    def __call__(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs"]:
+    def __call__(self, state: ArrayLike) -> Float[Array, "*outputs"]:
         """Restoring force at one state, eq. 11.
 
         Raises
@@ -227,15 +227,15 @@ class RKPM(AbstractScatteredMap):
         """
         return _derivatives(self, self._state(state), self._targets([(0,) * self.dim]))[0]
 
-    def gradient(self, state: Float[ArrayLike, " dim"]) -> Float[Array, "*outputs dim"]:
+    def gradient(self, state: ArrayLike) -> Float[Array, "*outputs dim"]:
         """First derivatives at one state, reproduced exactly for polynomials (eq. 46)."""
         return jnp.moveaxis(_derivatives(self, self._state(state), self._targets(first_derivatives(self.dim))), 0, -1)
 
-    def derivative(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
+    def derivative(self, state: ArrayLike, orders: tuple[int, ...]) -> Float[Array, "*outputs"]:
         """Derivative at one state; ``orders=(3, 0)`` is the third one in the first column (eq. 46)."""
         return _derivatives(self, self._state(state), self._targets([orders]))[0]
 
-    def std(self, state: Float[ArrayLike, " dim"], orders: tuple[int, ...] | None = None) -> Float[Array, "*outputs"]:
+    def std(self, state: ArrayLike, orders: tuple[int, ...] | None = None) -> Float[Array, "*outputs"]:
         r"""Standard error of the force at one state from the scatter of the neighbours about the local fit.
 
         With `orders`, as for `derivative`, that of the derivative.
@@ -266,7 +266,7 @@ class RKPM(AbstractScatteredMap):
         return _standard_error(self, self._state(state), self._targets([orders or (0,) * self.dim]))
 
     def evaluate_derivatives(
-        self, states: Float[ArrayLike, "q dim"], orders: Sequence[MultiIndex]
+        self, states: ArrayLike, orders: Sequence[MultiIndex]
     ) -> Float[Array, "q derivatives *outputs"]:
         """Several derivatives at many states; ``(0, 0)`` among `orders` is the force itself.
 

@@ -53,7 +53,7 @@ def safe_root(values: Float[Array, "..."]) -> Float[Array, "..."]:
     return jnp.where(positive, jnp.sqrt(jnp.where(positive, values, 1.0)), 0.0)
 
 
-def window_weights(z: Float[Array, "nodes dim"], window: AbstractWindow) -> Float[Array, " nodes"]:
+def window_weights(z: Float[Array, "*nodes dim"], window: AbstractWindow) -> Float[Array, "*nodes"]:
     """φ of the radial distance in dilations; smooth where a node and the point coincide."""
     return window(safe_root(jnp.sum(z**2, axis=-1)))
 
