@@ -68,8 +68,17 @@ TAIL = """## To change something
 VERDICTS = (
     ("no", "", "", "", "", "", "consistent"),
     ("yes", "yes", "", "", "", "", "parameters"),
-    ("yes", "no", "yes", "right", "yes, or none are held out", "", "cause"),
-    ("yes", "no", "yes", "wrong, the rest negligible", "nearly all is closed", "", "cause, its class; the law is open"),
+    ("yes", "no", "yes", "right", "yes, or none are held out", "", "cause; its law is open below `class_named`"),
+    ("yes", "no", "its class", "right", "yes, or none are held out", "", "cause, its class; the law is open"),
+    (
+        "yes",
+        "no",
+        "yes",
+        "wrong, or a map does better",
+        "nearly all is closed",
+        "",
+        "cause, its class; the law is open",
+    ),
     ("yes", "no", "no, or wrong shape", "", "yes", "yes", "unnamed"),
     ("otherwise", "", "", "", "", "", "undecided, with the check that stopped it"),
 )

@@ -8,9 +8,9 @@ import pytest
 
 import jfsm
 from jfsm.demo import DAMPING, FRICTION, MASS, STIFFNESS, hidden_friction
+from jfsm.diagnosis.evidence.course import BASE, remeasured
 from jfsm.diagnosis.evidence.excess import is_noise_only
 from jfsm.diagnosis.evidence.fitted import Trial
-from jfsm.diagnosis.evidence.free_runs import BASE, remeasured
 from jfsm.diagnosis.evidence.noise_draws import beside_chance, noise_beyond
 from jfsm.diagnosis.evidence.setup import Problem
 from jfsm.diagnosis.search.baseline import fit_model

@@ -1,7 +1,7 @@
 """The outcome of a diagnosis, as a value."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -19,8 +19,30 @@ from .verdict.decision import Decision
 class Finding:
     """One named cause, or one own value that is wrong.
 
-    `kind` is the class of the cause in words, and `kind_probability` that of the class: of the cause and of those of
-    its rivals that belong there.
+    Attributes
+    ----------
+    cause, family : str
+        Id of the cause, and of its family.
+    at : tuple
+        Its place: a link (i, j), or a channel.
+    probability : float
+        Of the cause, with or without other effects.
+    parameters : dict
+        Its numbers.
+    rivals : tuple of Rival
+        Causes that may stand in its place.
+    sentence : str
+    kind : str
+        The narrowest class of laws that is sure to act there, in words.
+    kind_probability : float
+        Of the class.
+    law_open : bool
+        Whether the class is sure and the law is not: then `cause` is the most probable of its `members`.
+    members : dict
+        Probability of every cause of the class that has a chance.
+    size : Estimate or None
+        What all members share: friction [N] by the energy that it takes over the way, the damping or the stiffness that
+        is added, or the rms of the force, along the motion that was measured. The interval holds that of every member.
     """
 
     cause: str
@@ -32,6 +54,9 @@ class Finding:
     sentence: str = ""
     kind: str = ""
     kind_probability: float = 0.0
+    law_open: bool = False
+    members: dict[str, float] = field(default_factory=dict)
+    size: Estimate | None = None
 
 
 @dataclass(frozen=True)

@@ -107,12 +107,15 @@ class Thresholds:
     alike: float = _number(
         0.3,
         "share",
-        "Probability of another law of the family, in those of the leader, that may take its place.",
+        "Probability of another law of the class, in those of the leader, that may take its place.",
         _BLIND,
     )
     named: float = _number(0.5, "probability", "Probability from which a cause is named.", "more likely than not")
-    family: float = _number(
-        0.8, "probability", "Probability of a family from which its likeliest law is named.", _BLIND
+    class_named: float = _number(
+        0.8,
+        "probability",
+        "Probability from which a class of laws is named where no law is sure; a law below it is open.",
+        _BLIND,
     )
     fewest_looks: float = _number(
         10.0, "looks", "Independent looks, at least, that the prediction error of a record stands for.", _BLIND

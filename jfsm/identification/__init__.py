@@ -39,4 +39,5 @@ from ._unknowns import interval as interval
 from ._unknowns import natural_size as natural_size
 from ._unknowns import nuisance_unknowns as nuisance_unknowns
 from ._unknowns import own_unknown as own_unknown
+from ._unknowns import values_of as values_of
 from ._unknowns import with_offsets as with_offsets

@@ -62,6 +62,9 @@ def findings_table(findings: Sequence[Dictionary]) -> Table:
         for name, estimate in (finding.get("parameters") or {"": {}}).items():
             rows.append((*head, name, *_estimate_cells(estimate)))
             head = ("", "", "")
+        if finding.get("law_open") and finding.get("size"):
+            name, chance = f"{finding['kind']}, law open", probability(finding["kind_probability"])
+            rows.append((name, place_name(finding.get("at")), chance, "size", *_estimate_cells(finding["size"])))
     return Table(
         "Found", ("cause", "place", "probability", "parameter", "value", "95 % interval"), tuple(rows), _words(0, 1, 3)
     )

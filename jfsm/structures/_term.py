@@ -123,6 +123,8 @@ class AbstractTerm(eqx.Module):
     """Whether its force depends on the time itself."""
     contains: ClassVar[tuple[type["AbstractTerm"], ...]] = ()
     """Laws that this one is for certain of its numbers."""
+    is_whole_spring: ClassVar[bool] = False
+    """Whether it may be all of a spring, so that it takes the place of a linear one, and not only add to it."""
     base: ClassVar[tuple[float, ...]] = ()
     """Share of the base's acceleration that each hidden state loses: 1 for the velocity of a mass of its own."""
 

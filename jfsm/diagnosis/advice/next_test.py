@@ -22,8 +22,8 @@ from ...identification import LADDER, Nuisances, approach, finish, lanes_of, pre
 from ...plant import force_at
 from ...records import Record
 from ...structures import AbstractTerm, Structure
+from ..evidence.course import remeasured
 from ..evidence.fitted import Trial
-from ..evidence.free_runs import remeasured
 from ..evidence.noise_draws import noise_levels
 from ..evidence.setup import Problem
 from ..hypotheses.initial_values import found_in, own_part

@@ -8,7 +8,7 @@ from ...identification import LEAST_SAMPLES
 from ...records import Record, defects
 from ...structures import Clipping, Structure, causes
 from .._diagnosis import Estimate, Finding
-from ..report.law_class import class_of
+from ..hypotheses.law_classes import SENSOR
 
 PROBABILITY = 0.99
 """That samples at one level are clipped ones: noise does not come back to a level by itself."""
@@ -46,5 +46,7 @@ def clipped_channel(sensor: Clipping, unit: str) -> Finding:
     limit, cause = sensor.value, causes()["clipping"]
     estimate = Estimate(limit, limit * (1 - _SAME), limit * (1 + _SAME), unit)
     values = {"limit": estimate}
-    kind = class_of(cause, sensor)
-    return Finding(cause.id, cause.family, sensor.at, PROBABILITY, values, (), cause.sentence, kind, PROBABILITY)
+    return Finding(
+        cause.id, cause.family, sensor.at, PROBABILITY, values, (), cause.sentence, SENSOR, PROBABILITY,
+        members={cause.id: PROBABILITY}, size=estimate,
+    )  # fmt: skip

@@ -145,9 +145,13 @@ def has_map(key: str) -> bool:
 
 
 def _numbers(written: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        name: [float(v) for v in value] if isinstance(value, list) else float(value) for name, value in written.items()
-    }
+    return {name: _number(value) for name, value in written.items()}
+
+
+def _number(value: Any) -> Any:
+    if isinstance(value, list):
+        return [float(v) for v in value]
+    return value if value is None or isinstance(value, bool) else float(value)
 
 
 _MADE: Mapping[str, Callable[[Any], Any]] = {

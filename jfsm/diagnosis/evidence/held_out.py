@@ -11,7 +11,8 @@ class HeldOutErrors:
     """Root mean square errors of free runs, as shares of the channels' spreads (root of the mean over channels).
 
     `before` is the model as given, `refitted` its own values refitted, `after` the hypothesis, `floor` what noise in
-    the drive, in the start and in the readings would leave; `interval` is the 95 % one of `closed`.
+    the drive, in the start and in the readings would leave; `interval` is the 95 % one of `closed`. What an effect
+    closes counts `beyond_refit`. Where noise alone makes runs part, they are `horizon` long [s].
     """
 
     before: float
@@ -19,11 +20,18 @@ class HeldOutErrors:
     after: float
     floor: float
     interval: tuple[float, float]
+    beyond_refit: bool = False
+    horizon: float | None = None
+
+    @property
+    def without(self) -> float:
+        """Error of what the hypothesis is an effect beside: the refitted model, else the model as given."""
+        return self.refitted if self.beyond_refit else self.before
 
     @property
     def closable(self) -> bool:
-        """Whether the model as given leaves more than noise would."""
-        return closable(self.before, self.floor)
+        """Whether the model without the hypothesis leaves more than noise would."""
+        return closable(self.without, self.floor)
 
     @property
     def significant(self) -> bool:
@@ -32,11 +40,11 @@ class HeldOutErrors:
 
     @property
     def closed(self) -> float:
-        """Share of the closable error that is closed: (before - after) / (before - floor), at most 1.
+        """Share of the closable error that is closed: (without - after) / (without - floor), at most 1.
 
         0 where there was nothing to close.
         """
-        return share_closed(self.before, self.after, self.floor)
+        return share_closed(self.without, self.after, self.floor)
 
 
 def share_closed(before: float, after: float, floor: float) -> float:

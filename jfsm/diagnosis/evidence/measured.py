@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import jax
+import numpy as np
 
 from ...structures import Clipping, Structure
 from ..hypotheses.effect import key_of
@@ -90,15 +91,22 @@ class Weighed:
         )
 
     def _cards(self) -> Iterator[Scorecard]:
-        every, model, records = self.found.every, self.problem.model, self.problem.records
-        why_not_identifiable, stands_for_the_drive = untold(records), in_step(records)
+        every, problem = self.found.every, self.problem
+        why_not_identifiable, stands_for_the_drive = untold(problem.records), in_step(problem.records)
         for t in every:
             if self.model_error:  # laws of time are none here, whatever the records show
-                yield scorecard(t, every, model)
+                card = scorecard(t, every, problem)
             else:
-                yield scorecard(
-                    t, every, model, in_step=stands_for_the_drive(t), not_identifiable=why_not_identifiable(t)
+                card = scorecard(
+                    t, every, problem, in_step=stands_for_the_drive(t), not_identifiable=why_not_identifiable(t)
                 )
+            yield replace(card, prediction=card.prediction.at_floor(self._least_left))
+
+    @cached_property
+    def _least_left(self) -> np.ndarray:
+        """Error power per set that the best hypothesis leaves."""
+        errors = np.array([t.prediction.error for t in self.found.every])
+        return np.min(np.where(np.isfinite(errors), errors, np.inf), axis=0)
 
     def _other_shapes(self, key: str) -> OtherShapes:
         return self.found.lack(self.trial(key))
@@ -108,7 +116,7 @@ class Weighed:
         if found is None:
             return None
         self.maps[map_on(key)] = found
-        return found.prediction
+        return found.prediction.at_floor(self._least_left)
 
     def _held_out(self, key: str) -> HeldOutErrors | None:
         runs = self.held_out
@@ -118,7 +126,10 @@ class Weighed:
             trial, refitted, first = self.trial(key), self.found.refitted, self.problem.first
             extended = (lambda record: runs.model) if key == GIVEN else trial.extended
             noise = noise_levels(trial, first)
-            self.runs[key] = measure_gain(runs.stated, refitted.extended, extended, runs.held, noise, first, runs.key)
+            beyond_refit = has_map(key) or bool(trial.effects)
+            self.runs[key] = measure_gain(
+                runs.stated, refitted.extended, extended, runs.held, noise, first, runs.key, beyond_refit=beyond_refit
+            )
         return self.runs[key][0].errors
 
     def _with_model_error(self) -> Evidence | None:

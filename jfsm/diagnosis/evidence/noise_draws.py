@@ -16,9 +16,9 @@ from ...identification import Nuisances
 from ...plant import InterpolatedInput
 from ...records import Record
 from ...structures import Clipping
+from .course import BASE, remeasured
 from .excess import is_noise_only, white
 from .fitted import Prediction, Trial, ended, extent, free_run, predict, runs_away, sets
-from .free_runs import BASE, remeasured
 from .setup import Problem
 
 _DRAWS = 6

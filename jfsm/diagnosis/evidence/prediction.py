@@ -44,6 +44,13 @@ class Prediction:
         most = np.maximum(2 * baseline.expected, _LOST * baseline.error)
         return Prediction(self.error, np.minimum(self.expected, most), np.minimum(self.scatter, most))
 
+    def at_floor(self, least: np.ndarray) -> "Prediction":
+        """The same, with no more left to noise than `least`, what it left of the best hypothesis per set.
+
+        Noise is common to all hypotheses.
+        """
+        return Prediction(self.error, np.minimum(self.expected, least), np.minimum(self.scatter, least))
+
     def with_noise(self, power: np.ndarray) -> "Prediction":
         """The same, with so much more noise expected per set."""
         return replace(self, expected=self.expected + power)

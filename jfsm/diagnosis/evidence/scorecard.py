@@ -8,11 +8,13 @@ import numpy as np
 
 from ...structures import AccelerationBias, AccelerationGain, ForceGain, Preload, Structure
 from ..hypotheses.effect import Effect
+from ..hypotheses.law_classes import classes_of
 from .between_records import differences
 from .fitted import Trial
 from .own_values import at_bounds, offset_cost, prior_cost
 from .plain import as_plain
 from .prediction import Prediction
+from .setup import Problem
 
 GIVEN, REFITTED = "given", "refitted"
 """Keys of the model as given, and with its own values refitted."""
@@ -27,7 +29,7 @@ _ROLES: Mapping[type, str] = {
 
 
 class EffectCard(NamedTuple):
-    """A cause at its place, as far as a verdict depends on it."""
+    """A cause at its place, as far as a verdict depends on it; its classes are the narrowest first."""
 
     cause: str
     at: tuple
@@ -35,12 +37,13 @@ class EffectCard(NamedTuple):
     label: str
     role: str
     is_sensor: bool
+    classes: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, effect: Effect) -> "EffectCard":
+    def of(cls, effect: Effect, classes: tuple[str, ...] = ()) -> "EffectCard":
         cause = effect.cause
         role = _ROLES.get(cause.effect, SENSOR if cause.is_sensor else LAW)
-        return cls(cause.id, tuple(effect.at), cause.family, effect.label, role, cause.is_sensor)
+        return cls(cause.id, tuple(effect.at), cause.family, effect.label, role, cause.is_sensor, classes)
 
 
 class OtherShapes(NamedTuple):
@@ -132,7 +135,9 @@ class Scorecard:
     @classmethod
     def of_plain(cls, written: Mapping[str, Any]) -> "Scorecard":
         """What `plain` was made of."""
-        effects = tuple(EffectCard(**{**e, "at": tuple(e["at"])}) for e in written["effects"])
+        effects = tuple(
+            EffectCard(**{**e, "at": tuple(e["at"]), "classes": tuple(e["classes"])}) for e in written["effects"]
+        )
         sets = {name: np.array([float(v) for v in values]) for name, values in written["prediction"].items()}
         numbers = {name: float(v) for name, v in written.items() if isinstance(v, float | str) and name in _NUMBERS}
         tuples = {name: tuple(written[name]) for name in ("at_bounds", "special_cases")}
@@ -145,13 +150,18 @@ _NUMBERS = {
 
 
 def scorecard(
-    trial: Trial, among: Sequence[Trial], model: Structure, *, in_step: bool = False, not_identifiable: str = ""
+    trial: Trial, among: Sequence[Trial], problem: Problem, *, in_step: bool = False, not_identifiable: str = ""
 ) -> Scorecard:
-    """The scorecard of a trial among others, beside a model."""
+    """The scorecard of a trial among others, beside the model of a problem."""
+    peak = problem.first.crest * problem.first.length
+    speed = peak * problem.first.omega
     really = (law.otherwise(trial.structure.stiffness_of(law.at)) for law in trial.laws)
     return Scorecard(
         key=trial.key,
-        effects=tuple(EffectCard.of(effect) for effect in trial.effects),
+        effects=tuple(
+            EffectCard.of(effect, classes_of(effect.cause, part, peak, speed))
+            for effect, part in zip(trial.effects, trial.parts, strict=True)
+        ),
         evidence=trial.evidence,
         prediction=trial.prediction,
         whiteness=trial.whiteness,
@@ -166,7 +176,7 @@ def scorecard(
         in_step=in_step,
         not_identifiable=not_identifiable,
         special_cases=tuple(t.key for t in among if _is_special_case(t, trial)),
-        differs=_differs(trial, model),
+        differs=_differs(trial, problem.model),
     )
 
 

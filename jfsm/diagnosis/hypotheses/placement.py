@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import equinox as eqx
 import numpy as np
@@ -21,7 +22,7 @@ from ...identification import (
     scale_of,
     with_a_rest,
 )
-from ...structures import AbstractTerm, PeriodicDisturbance, Structure
+from ...structures import AbstractTerm, LinearStiffness, PeriodicDisturbance, Structure
 from .candidate import Candidate
 from .effect import Effect
 from .initial_values import Start
@@ -30,6 +31,8 @@ from .parametrisation import hypothesis
 
 SHAPES = 2
 """Starts of a law."""
+_ALMOST_NONE = 1e-6
+"""Share of a linear spring that is left where a law takes its place."""
 _WELLS = 2.0 ** (np.arange(-1, 7) / 2)
 """How far from the middle two wells are, in one and a half sizes of the motion,"""
 _SEEN_FROM = (0.03, 0.01)
@@ -86,7 +89,8 @@ class Laws:
     def of(self, effect: Effect) -> list[Candidate]:
         """The law from where it explains most, and where it may rest elsewhere, from there."""
         found = self.candidate(effect)
-        return [found, *self.about_a_rest(effect), *self.between_rests(effect, found.share)]
+        elsewhere = *self.about_a_rest(effect), *self.between_rests(effect, found.share)
+        return [found, *elsewhere, *self.in_place_of_the_spring(effect, found.share)]
 
     def candidate(self, effect: Effect) -> Candidate:
         """The law from where it explains most, and from its natural sizes."""
@@ -133,6 +137,22 @@ class Laws:
         ]
         found = {int(np.argmin(costs)) for costs in self._costs(tried)} if tried else set()
         return [tried[i] for i in sorted(found)]
+
+    def in_place_of_the_spring(self, effect: Effect, share: float | None) -> list[Candidate]:
+        """A law that may be a whole spring, beside next to nothing of the linear one that the model has there."""
+        at, model = effect.at, self.structure
+        springs = [t for t in model.terms if isinstance(t, LinearStiffness) and set(t.at) == set(at) and float(t.k) > 0]
+        if not effect.cause.effect.is_whole_spring or len(springs) != 1:
+            return []
+        [spring] = springs
+        without = model.with_values({f"{spring.kind}@{spring.place}.k": _ALMOST_NONE * float(spring.k)})
+        whole = self.missing.force + forces_of([spring], self.missing, self.nuisances)[0]
+        missing = replace(self.missing, force=whole)
+        found = place(
+            self._law(effect), missing, without, self.scale, self.nuisances, (), effect.cause.sign, sides=True
+        )
+        starts = tuple(without + placed.term for placed in found[:SHAPES] if placed.share is not None)
+        return [Candidate((effect,), starts, share)] if starts else []
 
     def _wells(self, effect: Effect) -> list[tuple[AbstractTerm, float]]:
         """Laws with wells at several distances, on either side, whose spring there is the model's, and their rests."""

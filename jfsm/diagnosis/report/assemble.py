@@ -21,8 +21,9 @@ from ..evidence.setup import Problem
 from ..hypotheses.candidate import Candidate
 from ..search.batches import LeftBehind
 from ..verdict.decision import Decision
+from ..verdict.judge import evidence_behind
 from .estimates import Units, noise_by_channel, refitted_values, smallest_effects, unit_of
-from .findings import findings_of, fitted_candidate, unfitted_candidate
+from .findings import Ranked, findings_of, fitted_candidate, unfitted_candidate
 from .force_shape import shape_of
 from .plain_data import Drawn, jfsm_version, plain_gain, plain_record
 from .sentences import difference_sentence, verdict_advice, verdict_sentence
@@ -52,6 +53,11 @@ class Reached(NamedTuple):
     term: AbstractTerm | None
     evidence: Evidence
 
+    def ranked(self, trials: list[Trial]) -> Ranked:
+        """The decision with the hypotheses behind it."""
+        cards = evidence_behind(self.decision, self.evidence).cards
+        return Ranked(self.decision, {t.key: t for t in trials}, cards)
+
 
 def assemble(
     reached: Reached,
@@ -69,13 +75,13 @@ def assemble(
     decision, unfinished, model, records = reached.decision, tested.unfinished, problem.model, problem.records
     first, verdict = records[0], decision.verdict
     units, imposed = first.record.units, first.path is not None
-    findings = findings_of(decision, reached.winner, tested.trials, clipped, model, first)
+    findings = findings_of(reached.ranked(tested.trials), reached.winner, clipped, model, missing, first)
     candidates = tuple(_candidates(tested, decision, refitted, model, units))
     winner = reached.winner if decision.winner != GIVEN else refitted
     refit = refitted_values(winner, model, units)
     between = [] if verdict == "consistent" else differences(winner)
     differ = [difference_sentence(one, unit_of(winner.structure, one.path, units)) for one in between]
-    notes = tuple(dict.fromkeys(_notes(unfinished, problem, differ, winner)))
+    notes = tuple(dict.fromkeys(_notes(unfinished, problem, differ, winner, gain)))
     smallest = smallest_effects(tested.seen, units)
     shape = shape_of(missing) if verdict in ("undecided", "unnamed") else None
     drawn = Drawn(missing, runs, reached.term, first.record, first.period, with_shape=verdict != "consistent")
@@ -121,13 +127,15 @@ def _candidates(
         yield unfitted_candidate(candidate.effects, decision, candidate.share or 0.0)
 
 
-def _notes(unfinished: Unfinished, problem: Problem, differ: list[str], winner: Trial) -> Iterator[str]:
+def _notes(
+    unfinished: Unfinished, problem: Problem, differ: list[str], winner: Trial, gain: Gain | None
+) -> Iterator[str]:
     """What was not done, and what a reader has to know about the records and the runs."""
     first = problem.first
     yield from unfinished.notes
     for nuisances in problem.records:
         yield from nuisances.notes
-    yield from how_run(first)
+    yield from how_run(first, gain)
     yield from zeros(first)
     yield from memories(first)
     yield from differ

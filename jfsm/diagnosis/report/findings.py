@@ -1,7 +1,7 @@
 """Named causes, wrong values and the candidates that lost, with their values and probabilities."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,27 +13,63 @@ from ..advice.next_test import RIVAL
 from ..channels.clipping import clipped_channel
 from ..evidence.between_records import differences
 from ..evidence.fitted import Trial
+from ..evidence.missing_force import Residual
+from ..evidence.scorecard import EffectCard, Scorecard
 from ..hypotheses.effect import Effect, key_of, names, places
+from ..thresholds import THRESHOLDS
 from ..verdict.decision import Decision
+from .class_size import Member, size_of_class
 from .estimates import Units, all_effect_values, effect_values, estimate
-from .law_class import WIDER, class_of
+
+
+class Ranked(NamedTuple):
+    """A decision with the hypotheses behind it: their trials and their scorecards, by key."""
+
+    decision: Decision
+    trials: Mapping[str, Trial]
+    cards: Mapping[str, Scorecard]
+
+    def members(self, kind: str, at: tuple) -> list[Member]:
+        """Every effect of a class at a place, in each hypothesis that has a chance."""
+        return [
+            Member(self.trials[key], which, self.decision.probability_of_class(key))
+            for key, card in self.cards.items()
+            for which, effect in enumerate(card.effects)
+            if effect.at == at and kind in effect.classes and self.decision.probability_of_class(key) > 0
+        ]
+
+    def probability(self, kind: str, at: tuple) -> float:
+        """Probability that something of a class acts at a place."""
+        chances = {m.trial.key: m.probability for m in self.members(kind, at)}
+        return sum(chances.values())
+
+    def shares(self, kind: str, at: tuple) -> dict[str, float]:
+        """Probability of every cause of a class at a place, the most probable first."""
+        found = dict[str, float]()
+        for m in self.members(kind, at):
+            found[m.cause] = found.get(m.cause, 0.0) + m.probability
+        return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+    def probability_of_effect(self, effect: Effect) -> float:
+        """Probability of an effect, with or without others."""
+        return sum((self.decision.probability(t.key) for t in self.trials.values() if effect in t.effects), 0.0)
 
 
 def findings_of(
-    decision: Decision,
+    ranked: Ranked,
     winner: Trial,
-    trials: Sequence[Trial],
     clipped: Sequence[Clipping],
     model: Structure,
+    missing: Residual,
     nuisances: Nuisances,
 ) -> tuple[Finding, ...]:
     """The causes or the wrong values that a decision names, the surest or the most wrong first.
 
     Clipped channels follow the causes.
     """
-    units = nuisances.record.units
+    units, decision = nuisances.record.units, ranked.decision
     if decision.verdict == "cause":
-        found = [_finding(which, decision, winner, trials, model, nuisances) for which in range(len(winner.effects))]
+        found = [_finding(which, ranked, winner, model, missing, nuisances) for which in range(len(winner.effects))]
         found.sort(key=lambda f: -f.probability)
         return (*found, *(clipped_channel(sensor, units[sensor.at[0]]) for sensor in clipped))
     if decision.verdict == "parameters":
@@ -41,72 +77,53 @@ def findings_of(
     return ()
 
 
-class _Replacement(NamedTuple):
-    """An effect that takes the place of one of the winner's in a trial, and the trial's probability."""
-
-    effect: Effect
-    trial: Trial
-    probability: float
-
-
 def _finding(
-    which: int,
-    decision: Decision,
-    winner: Trial,
-    trials: Sequence[Trial],
-    model: Structure,
-    nuisances: Nuisances,
+    which: int, ranked: Ranked, winner: Trial, model: Structure, missing: Residual, nuisances: Nuisances
 ) -> Finding:
     """One effect of the winner; its rivals are the effects that may take its place, the winner's others aside."""
-    effect = winner.effects[which]
-    cause, values = effect.cause, effect_values(winner, which, model, nuisances.record.units)
-    probability = sum((decision.probability(t.key) for t in trials if effect in t.effects), 0.0)
-    replacements = _replacements(effect, decision, winner, trials)
-    kind, kind_probability = _likely_class(effect, winner, probability, replacements, nuisances)
-    rivals = _rivals(replacements)
+    effect, units = winner.effects[which], nuisances.record.units
+    probability = ranked.probability_of_effect(effect)
+    kind, kind_probability = _narrowest_sure(ranked.cards[winner.key].effects[which], ranked)
+    shares = ranked.shares(kind, effect.at)
+    members = {cause: share for cause, share in shares.items() if share >= RIVAL or cause == effect.cause.id}
+    likely = [m for m in ranked.members(kind, effect.at) if m.cause in members]
     return Finding(
-        cause.id, cause.family, effect.at, probability, values, rivals, cause.sentence, kind, kind_probability
+        cause=effect.cause.id,
+        family=effect.cause.family,
+        at=effect.at,
+        probability=probability,
+        parameters=effect_values(winner, which, model, units),
+        rivals=_rivals(effect, ranked.decision, winner, list(ranked.trials.values())),
+        sentence=effect.cause.sentence,
+        kind=kind,
+        kind_probability=kind_probability,
+        law_open=probability < THRESHOLDS.class_named or ranked.decision.near == winner.key,
+        members=members,
+        size=size_of_class(kind, likely, missing, nuisances.record.dt, units),
     )
 
 
-def _replacements(effect: Effect, decision: Decision, winner: Trial, trials: Sequence[Trial]) -> list[_Replacement]:
-    """Effects in place of one of the winner's, in possible trials that have no other that the winner lacks."""
-    found = []
+def _narrowest_sure(effect: EffectCard, ranked: Ranked) -> tuple[str, float]:
+    """The narrowest class of an effect that is sure, with its probability; the likeliest of its classes if none is."""
+    chances = {kind: ranked.probability(kind, effect.at) for kind in effect.classes}
+    sure = (kind for kind, chance in chances.items() if chance >= THRESHOLDS.class_named)
+    kind = next(sure, max(chances, key=lambda kind: chances[kind]))
+    return kind, chances[kind]
+
+
+def _rivals(effect: Effect, decision: Decision, winner: Trial, trials: Sequence[Trial]) -> tuple[Rival, ...]:
+    """Effects that may take the place of one of the winner's, each once, the most probable first.
+
+    They do so in possible trials that have no other effect that the winner lacks.
+    """
+    shares = dict[Effect, float]()
     for t in trials:
         others, probability = set(t.effects) - set(winner.effects), decision.probability(t.key)
         if effect not in t.effects and len(others) == 1 and probability > 0:
-            found.append(_Replacement(others.pop(), t, probability))
-    return found
-
-
-def _rivals(replacements: Sequence[_Replacement]) -> tuple[Rival, ...]:
-    """The replacements that have a chance, each once, the most probable first."""
-    shares = dict[Effect, float]()
-    for one in replacements:
-        shares[one.effect] = shares.get(one.effect, 0.0) + one.probability
+            other = others.pop()
+            shares[other] = shares.get(other, 0.0) + probability
     ranked = sorted(shares.items(), key=lambda item: -item[1])
-    return tuple(Rival(effect.cause.id, effect.at, share) for effect, share in ranked if share > RIVAL)
-
-
-def _likely_class(
-    effect: Effect, winner: Trial, probability: float, replacements: Sequence[_Replacement], nuisances: Nuisances
-) -> tuple[str, float]:
-    """Class of an effect of some `probability` in words, and the probability of the class.
-
-    Where the class is unlikely, and laws of the family are likelier, it is the family's.
-    """
-    peak = nuisances.crest * nuisances.length
-
-    def class_in(t: Trial, effect: Effect) -> str:
-        return class_of(effect.cause, t.parts[t.effects.index(effect)], peak, peak * nuisances.omega)
-
-    kind, family = class_in(winner, effect), effect.cause.family
-    there = [one for one in replacements if one.effect.at == effect.at]
-    same_class = sum((one.probability for one in there if class_in(one.trial, one.effect) == kind), 0.0)
-    same_family = sum((one.probability for one in there if one.effect.cause.family == family), 0.0)
-    if probability + same_class < 0.5 and same_family > same_class + RIVAL and family in WIDER:
-        return WIDER[family], probability + same_family
-    return kind, probability + same_class
+    return tuple(Rival(other.cause.id, other.at, share) for other, share in ranked if share > RIVAL)
 
 
 def _wrong_values(t: Trial, probability: float, model: Structure, units: Units) -> tuple[Finding, ...]:
@@ -124,7 +141,7 @@ def _wrong_values(t: Trial, probability: float, model: Structure, units: Units) 
         sentence = f"{kind} is off: stated {stated[u.path]:.6g}, found {value.value:.6g}"
         finding = Finding(
             PARAMETER_CAUSES[kind], "parameters", at, probability, {name: value}, (), sentence,
-            "a wrong value", probability,
+            "a wrong value", probability, members={PARAMETER_CAUSES[kind]: probability}, size=value,
         )  # fmt: skip
         found.append((_moved(t, k) / u.width, finding))
     return tuple(f for _, f in sorted(found, key=lambda item: -item[0]))

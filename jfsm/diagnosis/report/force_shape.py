@@ -7,6 +7,7 @@ from numpy.polynomial.legendre import legvander
 
 from ..._types import evenly_taken
 from ..evidence.missing_force import Residual
+from ..hypotheses.curves import bent, growth
 
 _DEGREE = 9
 """Of the polynomials that stand for the parts that follow one of displacement and velocity."""
@@ -16,8 +17,6 @@ _APART = 1e-3
 ellipse, even ones in displacement and in velocity are the same."""
 _MOST, _MUCH = 0.7, 0.3
 """Shares from which a part is most of a force, or much of it."""
-_BENT = 0.05
-"""Share of a part's power that a cube must hold beside a straight line for its growth to be told."""
 
 
 class Shape(NamedTuple):
@@ -84,15 +83,3 @@ def shape_of(found: Residual) -> Shape | None:
     share = float(np.var(odd) / max(np.var(odd) + np.var(even), np.finfo(float).tiny))
     grows = growth((u, z)[leading], odd) if share > _MUCH else 0
     return Shape(1.0 - left / there, power[0] / total, power[1] / total, rest / total, share, grows)
-
-
-def bent(axis: np.ndarray, odd: np.ndarray, even: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Odd and even part of a curve without its straight line and its constant."""
-    return odd - axis * (axis @ odd) / (axis @ axis), even - np.mean(even)
-
-
-def growth(axis: np.ndarray, odd: np.ndarray) -> int:
-    """Sign of the cube in an odd curve without its straight line, where it holds a share of it."""
-    cube = axis**3 - axis * (axis @ axis**3) / (axis @ axis)
-    held = float(cube @ odd) / max(np.linalg.norm(cube) * np.linalg.norm(odd), np.finfo(float).tiny)
-    return int(np.sign(held)) if held**2 > _BENT else 0

@@ -91,6 +91,8 @@ def plain_gain(gain: Gain | None) -> dict[str, Any] | None:
         "refitted": gain.refitted,
         "after": gain.after,
         "floor": gain.floor,
+        "beyond_refit": gain.beyond_refit,
+        "horizon": gain.horizon,
         "channels": channels,
     }
 

@@ -13,8 +13,6 @@ from ..thresholds import THRESHOLDS
 from ..verdict.decision import Decision
 from .force_shape import Shape
 
-_SURE = 0.9
-"""Probability of a cause from which its name is not open."""
 _GO_ON = "Let the search go on to its end before the model is changed."
 _NO_GAIN = "Do not change the model for the sake of its predictions: on held-out readings it gains no more than chance."
 _ADVICE = {
@@ -43,10 +41,11 @@ def verdict_sentence(
     """The verdict in words, with the sentences on `differences` between records and the gain on held-out readings."""
     gained = _gained(gain, imposed=imposed)
     if decision.verdict == "consistent":
-        return "The record shows nothing beyond noise that the model lacks."
+        return "The record shows nothing beyond noise that the model lacks." + _trace(decision, winner)
     if decision.verdict == "parameters":
         what = "; ".join(f.sentence for f in findings) or "its own values moved together"
-        return " ".join([f"The form of the model is right, its values are off: {what}.", *differences]) + gained
+        words = f"The form of the model is right, its values are off: {what}.{_trace(decision, winner)}"
+        return " ".join([words, *differences]) + gained
     if decision.verdict == "cause":
         return " ".join([_named(decision, winner, findings), *differences]) + gained
     if decision.verdict == "unnamed":
@@ -78,14 +77,25 @@ def finding_sentence(finding: Finding, known: Mapping[str, Cause]) -> str:
     """A finding in words; where its law is open, its class comes first, and then the laws that it may be."""
     cause, where = known[finding.cause], "-".join(map(str, finding.at))
     lacks = "The record shows" if cause.is_sensor else "The model lacks"
-    others = [(known[r.cause].label, r.probability) for r in finding.rivals if r.cause in known]
-    if finding.probability < _SURE and finding.kind_probability - finding.probability > RIVAL:
-        listed = ", ".join(f"{name} ({chance:.0%})" for name, chance in [(cause.label, finding.probability), *others])
-        return f"{lacks} {finding.kind} at {where} ({finding.kind_probability:.0%}); its law is open: {listed}."
+    if finding.law_open and finding.kind_probability - finding.probability > RIVAL:
+        return f"{lacks} {finding.kind} at {where}{_how_much(finding)}; its law is open: {_laws(finding, known)}."
     named = f"{lacks} {cause.label} at {where}: {finding.sentence}."
-    if finding.probability >= 0.5 or not finding.rivals:
+    if finding.probability >= THRESHOLDS.named or not finding.rivals:
         return named
-    return f"{named} By this record it may as well be {' or '.join(dict(others))}."
+    others = (known[r.cause].label for r in finding.rivals if r.cause in known)
+    return f"{named} By this record it may as well be {' or '.join(dict.fromkeys(others))}."
+
+
+def _how_much(finding: Finding) -> str:
+    """How sure a class is, and its size with the interval, in words."""
+    size = finding.size
+    about = "" if size is None else f", about {size.value:.3g} {size.unit} [{size.low:.3g}, {size.high:.3g}]"
+    return f" ({finding.kind_probability:.0%}){about}"
+
+
+def _laws(finding: Finding, known: Mapping[str, Cause]) -> str:
+    """The laws of a class with their probabilities in words."""
+    return ", ".join(f"{known[name].label} ({share:.0%})" for name, share in finding.members.items() if name in known)
 
 
 def _named(decision: Decision, winner: Trial, findings: Sequence[Finding]) -> str:
@@ -107,9 +117,18 @@ def _remainder(winner: Trial) -> str:
     return f" Something is left beyond {'them' if len(winner.effects) > 1 else 'it'}: {left:.1%} of the signal."
 
 
+def _trace(decision: Decision, winner: Trial) -> str:
+    """What is left where it is no cause; empty where nothing is."""
+    if all(row.passed for row in decision.checks if row.name == "more_than_a_trace"):
+        return ""
+    left = winner.prediction.left()
+    return f" A trace is left, {left:.1%} of the signal, which laws of several classes explain alike: it is no cause."
+
+
 def _gained(gain: Gain | None, *, imposed: bool) -> str:
     """Errors on held-out readings before and after."""
     if gain is None:
         return ""
     error = "error of the predicted force" if imposed else "free-run error"
-    return f" The {error} on held-out readings goes from {gain.before:.2%} to {gain.after:.2%} of the signal."
+    refitted = f" ({gain.refitted:.2%} refitted)" if gain.beyond_refit else ""
+    return f" The {error} on held-out readings goes from {gain.before:.2%}{refitted} to {gain.after:.2%} of the signal."

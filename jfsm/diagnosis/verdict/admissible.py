@@ -137,8 +137,8 @@ def _second_effect_pays(card: Scorecard, bench: Bench) -> Reason:
     singles = [alone for alone in bench.apart_from_the_drive if len(alone.effects) == 1]
     best = max(singles, key=lambda alone: alone.evidence, default=None)
     for alone in singles:
-        mine = alone is best or alone.effects[0] in card.effects
-        if mine and (enough := _is_enough(alone, card, bench)):
+        simpler = alone is best and alone.unknowns < card.unknowns
+        if (simpler or alone.effects[0] in card.effects) and (enough := _is_enough(alone, card, bench)):
             return f"{alone.effects[0].label} alone {enough}"
     return ""
 

@@ -169,12 +169,21 @@ CHECKS: Mapping[str, Kind] = {
         "It is more likely than everything else together.",
         ("named", "tempering", "fewest_looks", "most_looks", "periods_per_look", "unlisted"),
     ),
-    "probability_of_family": Kind(
+    "probability_of_class": Kind(
         "named",
         ">=",
         "probability",
-        "If it is not, the laws of its family together are likely.",
-        ("family",),
+        "If it is not, laws of a class that it belongs to are likely together: the narrowest such class is named, and "
+        "the law is open.",
+        ("class_named",),
+    ),
+    "more_than_a_trace": Kind(
+        "named",
+        "<",
+        "share of its gain",
+        "Where the refitted model leaves nothing, laws of other classes do not gain nearly all that it gains: what "
+        "unlike laws explain alike is a little that the noise's model lacks.",
+        ("nearly_all",),
     ),
     "same_in_all_records": Kind(
         "named",
@@ -236,17 +245,12 @@ CHECKS: Mapping[str, Kind] = {
         "Its held-out run is no worse than that of the model as given.",
         ("worse",),
     ),
-    "not_harmful": Kind(
-        "confirmed",
-        ">=",
-        "share of held-out error",
-        "If it leaves more than noise, its held-out run adds no error beyond chance.",
-    ),
     "gains_something": Kind(
         "confirmed",
         ">",
         "share of held-out error",
-        "If it is not likely, or predictions do not show it, its held-out run is better beyond chance.",
+        "If it leaves more than noise, its held-out run may close some of the error (the upper end of the interval); "
+        "if it is not likely, or predictions do not show it, it does so for certain (the lower end).",
         ("named", "beyond_question"),
     ),
     "closes_half": Kind(

@@ -40,7 +40,8 @@ def confirm(decision: Decision, evidence: Evidence, limits: Thresholds, *, long_
         decision = decision.refused(against[1], REFITTED, against[0])
     elif hearing.closes_too_little():
         decision = decision.less_sure("runs over held-out readings close less than half")
-    by_class = None if decision.near is None or decision.verdict != "undecided" else _of_its_class(decision, hearing)
+    open_yet = decision.near is not None and decision.verdict in ("undecided", "unnamed")
+    by_class = _of_its_class(decision, hearing) if open_yet else None
     return replace(by_class or decision, checks=(*decision.checks, *hearing.bench.log))
 
 
@@ -95,7 +96,7 @@ class _Hearing:
         return self.bench.check(name, self.decision.winner, measured, limit, says)
 
     def _not_worse(self) -> Objection:
-        if self.decision.verdict not in ("cause", "unnamed"):
+        if self.decision.verdict not in ("parameters", "cause", "unnamed"):
             return None
         most, errors = self.bench.limits.worse, self.errors
         times = errors.after / max(errors.before, errors.floor)
@@ -109,7 +110,7 @@ class _Hearing:
             return None
         high = self.errors.interval[1]
         says = f"closes {high:.0%} of the error on held-out readings at most; it must not add to it"
-        return self._refused(self._check("not_harmful", high, 0.0, says))
+        return self._refused(self._check("gains_something", high, 0.0, says))
 
     def _refused(self, row: Check) -> Objection:
         return None if row.passed else (row, "runs worse on held-out readings than the model as given")

@@ -12,6 +12,10 @@ MODEL = "model"
 """What a check is of that concerns no hypothesis but the model and its records."""
 
 
+SHAPE = "other shapes would gain beside it"
+"""Name of the factor that doubts the shape of a law, and says nothing against its class."""
+
+
 class Factor(NamedTuple):
     """One of the factors whose product is a probability."""
 
@@ -67,6 +71,10 @@ class Decision:
     def probability(self, key: str) -> float:
         """Probability of a hypothesis; 0 for one that is no alternative."""
         return product_of(self.factors.get(key, ()))
+
+    def probability_of_class(self, key: str) -> float:
+        """Probability that a hypothesis adds to those of its classes: whether its shape is right does not matter."""
+        return product_of([factor for factor in self.factors.get(key, ()) if factor.name != SHAPE])
 
     def less_sure(self, name: str, size: float = 0.5) -> "Decision":
         """The decision less sure of every cause, half as sure by default."""

@@ -8,7 +8,7 @@ from .bench import Bench, shown
 from .checks import Check
 from .decision import MODEL, Decision
 from .ranking import is_sure_of, rank
-from .right_shape import doubt, settle_shape
+from .right_shape import doubt, nearest, settle_shape
 
 _DECIDING = ("map_adds_little", "visible_in_prediction", "better_than_given")
 """Checks that decide for a map or the model as given whatever else is likely."""
@@ -31,6 +31,8 @@ class _Judgement:
         judge_candidates(bench)
         winner = rank(bench)
         verdict = self._by_prediction(winner)
+        if verdict == "unnamed" and winner.effects:
+            self._name_its_class(winner)
         if verdict == "cause" and not is_sure_of(winner, bench):
             verdict = "undecided"
         if verdict == "cause":
@@ -187,6 +189,12 @@ class _Judgement:
             return "cause", winner
         bench.stop(failed)
         return ("unnamed", bench.refitted) if self._map_stands_for_all() else ("undecided", winner)
+
+    def _name_its_class(self, winner: Scorecard) -> None:
+        """Beside a map that does better, a class of laws that is sure."""
+        if is_sure_of(winner, self.bench):
+            near = nearest(winner, self.bench)
+            self.near = None if near is None else near.key
 
     def _map_stands_for_all(self) -> bool:
         mapped = self.bench.evidence.with_map(REFITTED)

@@ -6,18 +6,24 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..evidence import excess
-from ..evidence.scorecard import Scorecard
+from ..evidence.scorecard import CONSTANT_FORCE, Scorecard
 from ..thresholds import THRESHOLDS, Thresholds
 from .admissible import is_possible
 from .bench import Bench, shown
+from .claims import Claim, alike, claims_of, holds, shares_a_class, words
+
+TRACE = "is a trace: laws of other classes gain about as much, where the refitted model leaves nothing"
 
 
 def rank(bench: Bench) -> Scorecard:
     """The most probable alternative; of a law and its special case that are about as probable, the latter."""
+    winner = _most_probable(bench)
+    if _is_a_trace(winner, bench):
+        for card in bench.passing:
+            if card.laws:
+                bench.reasons[card.key] = TRACE
+        winner = _most_probable(bench)
     passing = bench.passing
-    alternatives = [bench.given, bench.refitted, *passing]
-    _share_out(alternatives, bench)
-    winner = max(alternatives, key=lambda card: bench.probability(card.key))
     for card in passing:
         if card is not winner:
             bench.reasons[card.key] = "explains it too, but is less probable"
@@ -25,18 +31,46 @@ def rank(bench: Bench) -> Scorecard:
     if special is None:
         return winner
     bench.reasons |= {winner.key: "is hardly more probable than its special case", special.key: ""}
+    share = bench.probability(winner.key) / bench.probability(special.key)
+    bench.less_sure([special.key], "stands for the wider law, too", 1.0 + share)
+    bench.less_sure([winner.key], "its special case stands for it", 0.0)
     return special
 
 
-def family_of(winner: Scorecard, bench: Bench) -> list[Scorecard]:
-    """The alternatives whose effects are of the same families."""
-    return [card for card in bench.candidates if card.key in bench.factors and card.families == winner.families]
+def _most_probable(bench: Bench) -> Scorecard:
+    alternatives = [bench.given, bench.refitted, *bench.passing]
+    _share_out(alternatives, bench)
+    return max(alternatives, key=lambda card: bench.probability(card.key))
+
+
+def _is_a_trace(winner: Scorecard, bench: Bench) -> bool:
+    """Whether laws of other classes gain nearly all that the winner gains over a refit that leaves nothing.
+
+    What so many unlike laws explain is a little that the noise's model lacks, and no cause.
+    """
+    if all(law.role == CONSTANT_FORCE for law in winner.laws) or not bench.noise_only(bench.refitted):
+        return False
+    known = max(bench.given.evidence, bench.refitted.evidence)
+    likeliest = max((card.evidence for card in _single_laws(bench) if not shares_a_class(card, winner)), default=known)
+    share = (likeliest - known) / (winner.evidence - known)
+    says = f"laws of other classes gain {share:.0%} of what it gains, where the refitted model leaves nothing"
+    return not bench.check("more_than_a_trace", winner.key, share, bench.limits.nearly_all, says).passed
+
+
+def _single_laws(bench: Bench) -> list[Scorecard]:
+    """Alternatives of one law that is possible, and takes no drive's place."""
+    return [c for c in bench.apart_from_the_drive if len(c.effects) == 1 and c.laws and is_possible(c, bench)]
+
+
+def kin_of(winner: Scorecard, bench: Bench) -> list[Scorecard]:
+    """The alternatives whose effects are of the same classes as the winner's."""
+    return [card for card in bench.candidates if card.key in bench.factors and alike(card, winner)]
 
 
 def is_sure_of(winner: Scorecard, bench: Bench) -> bool:
-    """Whether a name, or at least its family, is probable enough to be said."""
+    """Whether a name, or at least a class of laws, is probable enough to be said."""
     _beside_likelier_laws(winner, bench)
-    family = sum(bench.probability(card.key) for card in family_of(winner, bench))
+    likely = {claim: _probability_of(claim, bench) for claim in claims_of(winner)}
     if not bench.noise_only(winner):
         # The rest may be the work of another law than the catalogue's: no name is surer than what it explains.
         bench.less_sure(list(bench.factors), "share of the excess that the leader explains", bench.explained(winner))
@@ -45,11 +79,17 @@ def is_sure_of(winner: Scorecard, bench: Bench) -> bool:
     named = bench.check("probability", winner.key, probability, limits.named, says)
     if named.passed:
         return True
-    says = f"laws of its family have a probability of {family:.0%}; {limits.family:.0%} are needed"
-    alike = bench.check("probability_of_family", winner.key, family, limits.family, says)
-    if not alike.passed:
-        bench.stop(named)
-    return bool(alike.passed)
+    for claim, chance in likely.items():
+        says = f"{words(claim)} has a probability of {chance:.0%}; {limits.class_named:.0%} are needed"
+        if bench.check("probability_of_class", winner.key, chance, limits.class_named, says).passed:
+            return True
+    bench.stop(named)
+    return False
+
+
+def _probability_of(claim: Claim, bench: Bench) -> float:
+    """Probability that something of these classes acts, with or without something else."""
+    return sum(bench.probability(card.key) for card in bench.candidates if holds(card, claim))
 
 
 def _beside_likelier_laws(winner: Scorecard, bench: Bench) -> None:
@@ -79,8 +119,9 @@ def _special_case(winner: Scorecard, passing: Sequence[Scorecard], bench: Bench)
     best = max(cases, key=lambda card: card.evidence, default=None)
     if best is None:
         return None
-    nats, least = winner.evidence - best.evidence, bench.limits.special_case
-    says = f"gains {shown(nats)} nats over its special case, {best.label}; at least {least:.3g} are needed"
+    nats = math.log(bench.probability(winner.key) / bench.probability(best.key))
+    least = bench.limits.special_case
+    says = f"is {shown(nats)} nats likelier than its special case, {best.label}; at least {least:.3g} are needed"
     seen = bench.check("no_simpler_law_as_good", winner.key, nats, least, says)
     return None if seen.passed else best
 

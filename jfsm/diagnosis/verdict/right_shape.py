@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..evidence import excess
 from ..evidence.scorecard import CONSTANT_FORCE, Scorecard
 from .bench import Bench, shown
 from .checks import Check
-from .ranking import family_of
+from .decision import SHAPE
+from .ranking import kin_of
 
 WRONG_SHAPE = "explains much of it, but is not of the right shape"
 _UNSEEN = "are two laws of which predictions show nothing, and may stand for one of another shape"
@@ -39,7 +39,7 @@ def doubt(card: Scorecard, gained: float, bench: Bench, *, shapeless: bool = Fal
 
 
 class Settled(NamedTuple):
-    """The law that stands for its family, the check that it fails, if it does, and a law whose class is right."""
+    """The law that stands for its class, the check that it fails, if it does, and a law whose class is right."""
 
     law: Scorecard
     failed: Check | None
@@ -47,17 +47,17 @@ class Settled(NamedTuple):
 
 
 def settle_shape(winner: Scorecard, bench: Bench) -> Settled:
-    """Whether the winner has the right shape, or another law of its family has where its own is wrong."""
+    """Whether the winner has the right shape, or another law of its class has where its own is wrong."""
     found, far, check = _of_right_shape(winner, bench)
-    family = [card.key for card in family_of(found, bench)]
-    bench.less_sure(family, "other shapes would gain beside it", 1.0 - 0.5 * min(far, 1.0))
+    kin = [card.key for card in kin_of(found, bench)]
+    bench.less_sure(kin, SHAPE, 1.0 - 0.5 * min(far, 1.0))
     against = _not_identifiable(found, bench) or _both_unseen(found, bench)
     if against is not None:
         bench.refuse(found.key, against.says)
         return Settled(found, against)
     if check.passed:
         return Settled(found, None)
-    near = _nearest(found, bench)
+    near = nearest(found, bench)
     bench.reasons[found.key] = WRONG_SHAPE
     if near is None:
         bench.refuse(found.key, WRONG_SHAPE)
@@ -65,9 +65,9 @@ def settle_shape(winner: Scorecard, bench: Bench) -> Settled:
 
 
 def _of_right_shape(winner: Scorecard, bench: Bench) -> tuple[Scorecard, float, Check]:
-    """The winner, or another law of its family whose shape is right where its own is not, with its doubt and check.
+    """The winner, or another law of its class whose shape is right where its own is not, with its doubt and check.
 
-    Predictions that all leave something hardly tell one law from another of its family.
+    Predictions that all leave something hardly tell one law from another of its class.
     """
     far, check = _doubt_of(winner, winner, bench)
     if check.passed or bench.noise_only(winner):
@@ -94,22 +94,22 @@ def _doubt_of(card: Scorecard, winner: Scorecard, bench: Bench) -> tuple[float, 
 
 
 def _alike(winner: Scorecard, bench: Bench) -> Sequence[Scorecard]:
-    """Other laws of the family that are not much less probable, the most probable first."""
+    """Other laws of its class that are not much less probable, the most probable first."""
     least = bench.limits.alike * bench.probability(winner.key)
-    alike = [card for card in family_of(winner, bench) if card is not winner]
+    alike = [card for card in kin_of(winner, bench) if card is not winner]
     ranked = sorted(alike, key=lambda card: -bench.probability(card.key))
     return [card for card in ranked if bench.probability(card.key) > least]
 
 
-def _nearest(winner: Scorecard, bench: Bench) -> Scorecard | None:
-    """The law of the winner's family that is right in its class though not in its shape, or None.
+def nearest(winner: Scorecard, bench: Bench) -> Scorecard | None:
+    """The law of the winner's class that is right in its class though not in its shape, or None.
 
     Predictions over some periods hardly tell such laws apart; runs over all that was fitted do.
     """
     if bench.white(winner) or len(winner.effects) > 1:
         return None
-    alike = [winner, *_alike(winner, bench)]
-    kin = [card for card in alike if excess.practically_all(card, bench.refitted, bench.limits)]
+    least = bench.limits.nearly_all
+    kin = [card for card in (winner, *_alike(winner, bench)) if bench.explained(card) >= least]
     if not kin:
         return None
     strays = np.array([max(bench.evidence.other_shapes(card.key).strays, 1e-9) for card in kin])

@@ -16,6 +16,7 @@ class SineStiffness(AbstractTerm):
     s: Scalar = eqx.field(converter=as_scalar)
     at: tuple[int, int] = eqx.field(converter=as_link, static=True, kw_only=True)
     kind = "sine_stiffness"
+    is_whole_spring = True
     parameters = (Parameter("k", force=1, length=-1, positive=False, meaning="stiffness at the centre"), _RATE)
 
     def force(self, d, w, z, t):
