@@ -1,5 +1,7 @@
 """The interval of a gain, how often it holds the share that is closed, and the runs that a gain is that of."""
 
+from dataclasses import replace
+
 import jax
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from scipy.interpolate import CubicSpline
 
 import jfsm
 from jfsm.diagnosis.evidence.free_runs import _interval, how_run, measure_gain
+from jfsm.diagnosis.evidence.held_out import HeldOutErrors
 from jfsm.diagnosis.evidence.split import HeldOut
 from jfsm.identification import prepare
 
@@ -110,3 +113,55 @@ def test_torn_readings_are_no_errors_of_a_run():
             jax.random.key(0),
         )
         assert gain.closed > 0.99
+
+
+def between_wells(n: int = 6000, rate: float = 20.0) -> jfsm.Record:
+    """A buckled spring pushed from well to well, of which two runs part however alike they begin."""
+    time = np.arange(n) / rate
+    drive = CubicSpline(time, 0.5 * np.cos(1.2 * time))
+
+    def rate_of(t: float, z: np.ndarray) -> list[float]:
+        return [z[1], float(drive(t)) - 0.3 * z[1] + z[0] - z[0] ** 3]
+
+    path = solve_ivp(rate_of, (0, time[-1]), [0.5, 0.0], t_eval=time, rtol=1e-10, atol=1e-12, max_step=1 / rate)
+    noise = 1e-3 * np.random.default_rng(2).standard_normal(n)
+    return jfsm.Record(time, drive(time), displacement=path.y[0] + noise)
+
+
+def test_a_run_between_wells_begins_where_the_readings_are_however_many_tell_its_start():
+    record = between_wells()[2000:]
+    spring, dashpot = jfsm.LinearStiffness(1.0, at=(0, 1)), jfsm.LinearDamping(0.3, at=(0, 1))
+    right = jfsm.Structure([1.0], [spring, dashpot]) + jfsm.DoubleWell(2.0, 1.0, at=(0, 1))
+    run = jfsm.simulate(right, record[:400], window=250).displacement[:, 0]
+    assert np.max(np.abs(run[:300] - record.channels["displacement", 1][:300])) < 0.02
+
+
+@pytest.mark.parametrize("sensitive", [True, False])
+def test_where_noise_makes_runs_part_they_are_as_long_as_they_agree(sensitive: bool):
+    record = between_wells() if sensitive else pushed(9.0)
+    if sensitive:
+        given = jfsm.Structure([1.0], [jfsm.LinearStiffness(1.0, at=(0, 1)), jfsm.LinearDamping(0.3, at=(0, 1))])
+        right = given + jfsm.DoubleWell(2.0, 1.0, at=(0, 1))
+    else:
+        given = jfsm.Structure([1.0], [jfsm.LinearStiffness(9.0, at=(0, 1)), jfsm.LinearDamping(1.5, at=(0, 1))])
+        right = given.with_values({"damping@0-1.c": VISCOUS}) + jfsm.SmoothCoulomb(FRICTION, 1e-2, at=(0, 1))
+    fitted, held = prepare(record, given), [HeldOut(record, len(record) // 3)]
+    noise = {("displacement", 1): 1e-3 if sensitive else 1e-5, ("force", 1): 1e-3 if sensitive else 0.0}
+    gain, (curves,) = measure_gain(
+        given, lambda of: given, lambda of: right, held, noise, fitted, jax.random.key(0), beyond_refit=True
+    )
+    assert (gain.horizon is not None) is sensitive and bool(how_run(fitted, gain)) is sensitive
+    assert gain.after < 0.1 and gain.closed > 0.9  # in one run the right law would look as wrong as any
+    share = (gain.refitted - gain.after) / (gain.refitted - gain.floor)
+    assert gain.closed == pytest.approx(min(share, 1.0), abs=1e-3)
+    if gain.horizon is not None:
+        assert 5 * fitted.period < gain.horizon < record.duration * 2 / 3
+        whole = jfsm.simulate(right, curves["record"]).displacement[:, 0]
+        assert np.sqrt(np.mean((whole - curves["record"].channels["displacement", 1]) ** 2)) > 0.3
+
+
+def test_what_a_cause_closes_counts_from_the_refitted_model():
+    errors = HeldOutErrors(before=0.8, refitted=0.3, after=0.2, floor=0.1, interval=(0.0, 1.0))
+    assert errors.closed == pytest.approx(6 / 7)
+    beyond = replace(errors, beyond_refit=True)
+    assert beyond.closed == pytest.approx(0.5) and beyond.without == 0.3

@@ -283,7 +283,7 @@ def test_of_laws_alike_the_one_whose_shape_is_right_is_named(nats: float, named:
     [
         (0.002, 0.4, (), None, True),
         (0.002, 0.02, (), None, False),
-        (0.002, 0.4, ("preload",), None, False),
+        (0.002, 0.4, ("preload",), None, True),
         (0.002, 0.4, (), 0.01, True),
     ],
 )

@@ -115,7 +115,8 @@ class MapSlot(eqx.Module):
 class Plant(eqx.Module):
     """Arrays of a structure and of its sensors, for one list of response channels.
 
-    `force_delay` and `channel_delay` are empty without delayed sensors: delays have programs of their own.
+    `force_gain`, `force_offset` and `channel_offset` are empty where every lane has its own elsewhere, `force_delay`
+    and `channel_delay` without delayed sensors: delays have programs of their own.
     `late_channel` holds the channel of each channel delay. Delayed forces reach back at most `reach` samples. With
     `rolled` stages of a step the program is a third smaller, as fast for one motion and its derivatives, and half as
     fast for many motions. Plants side by side have a leading axis of lanes on every array but those of whole numbers.
@@ -129,10 +130,10 @@ class Plant(eqx.Module):
     memory: Slots
     delayed: Slots
     maps: tuple[MapSlot, ...]
-    force_gain: Float[Array, "*lanes dof"]
-    force_offset: Float[Array, "*lanes dof"]
+    force_gain: Float[Array, "*lanes _"]
+    force_offset: Float[Array, "*lanes _"]
     channel_gain: Float[Array, "*lanes channels"]
-    channel_offset: Float[Array, "*lanes channels"]
+    channel_offset: Float[Array, "*lanes _"]
     force_delay: Float[Array, "*lanes dof_or_none"]
     channel_delay: Float[Array, "*lanes late"]
     late_channel: Int[Array, " late"]

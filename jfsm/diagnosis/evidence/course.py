@@ -23,8 +23,9 @@ _END = 20
 """One in so many samples of an imposed motion is its end."""
 _DRAWS = 4
 """Draws of noise that show what it leaves of a perfect model's run."""
-_PARTED = 0.3
-"""Distance of two runs, as a share of the signal over a period, from which they are no longer one motion."""
+_PARTED, _CLOSE = 0.3, 0.1
+"""Distance of two runs, as a share of the signal over a period, from which they are no longer one motion, and up to
+which they are nearly."""
 BASE = ("base_acceleration", 0)
 """What stands for the acceleration of the base among channels."""
 
@@ -127,11 +128,11 @@ def _cleaned(record: Record, wandering: Sequence[tuple], noise: Mapping[tuple, f
 
 
 def _stretches(record: Record, length: float | None) -> list[slice]:
-    """Stretches of a record that are run one by one: the whole, or about `length` seconds each.
+    """Stretches of a record that are run one by one: the whole, or at most `length` seconds each.
 
     In a longer one what nothing holds in place goes astray, however right the model.
     """
-    count = 1 if length is None else max(int(len(record) * record.dt / length), 1)
+    count = 1 if length is None else math.ceil(len(record) * record.dt / length - 1e-9)
     ends = np.linspace(0, len(record), count + 1).astype(int).tolist()
     return [slice(*pair) for pair in itertools.pairwise(ends)]
 
@@ -204,5 +205,6 @@ def agrees_for(
     apart = np.mean([np.mean(off**2, 0) / spread[c] for c, off in draws.items()], 0)[begin:]
     over = max(int(round(period)), 1)
     mean = np.convolve(apart, np.ones(over) / over, "valid")
-    parted = np.flatnonzero(mean > _PARTED**2)
-    return int(parted[0]) if parted.size else None
+    if np.all(mean <= _PARTED**2):
+        return None
+    return int(np.flatnonzero(mean > _CLOSE**2)[0])

@@ -142,6 +142,8 @@ def _as_far_as_runs_agree(
     if not apart:
         return found, None
     horizon = max(min(apart), _SHORTEST_RUN * fitted.period)
+    if horizon >= min(len(part.record[part.begin :]) * part.record.dt for part in held):
+        return found, None
     return compared(horizon), horizon
 
 
@@ -165,7 +167,8 @@ def _compared(
     left = {c: float(np.mean(each[:, course.counted] ** 2)) + noise.get(c, 0.0) ** 2 for c, each in draws.items()}
     curves = {"record": course.record[course.begin :], **{name: course.shown(run) for name, run in runs.items()}}
     blocks = _blocks([off[without], off["after"]], period)
-    apart = agrees_for(draws, spread, course.begin, period) if length is None else None
+    in_one_run = length is None and part.record.drive == "force"
+    apart = agrees_for(draws, spread, course.begin, period) if in_one_run else None
     agrees = None if apart is None else apart * course.record.dt
     return _Compared(squares | {"floor": left, "spread": spread}, blocks, curves, agrees)
 

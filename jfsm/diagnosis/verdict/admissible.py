@@ -135,7 +135,8 @@ def _second_effect_pays(card: Scorecard, bench: Bench) -> Reason:
     if len(card.effects) == 1:
         return ""
     singles = [alone for alone in bench.apart_from_the_drive if len(alone.effects) == 1]
-    best = max(singles, key=lambda alone: alone.evidence, default=None)
+    passing = [alone for alone in singles if not bench.reasons.get(alone.key)]
+    best = max(passing, key=lambda alone: alone.evidence, default=None)
     for alone in singles:
         simpler = alone is best and alone.unknowns < card.unknowns
         if (simpler or alone.effects[0] in card.effects) and (enough := _is_enough(alone, card, bench)):

@@ -106,9 +106,9 @@ def nearest(winner: Scorecard, bench: Bench) -> Scorecard | None:
 
     Predictions over some periods hardly tell such laws apart; runs over all that was fitted do.
     """
-    if bench.white(winner) or len(winner.effects) > 1:
+    if bench.white(winner):
         return None
-    least = bench.limits.nearly_all
+    least = bench.limits.nearly_all if len(winner.effects) == 1 else bench.limits.almost_all
     kin = [card for card in (winner, *_alike(winner, bench)) if bench.explained(card) >= least]
     if not kin:
         return None
