@@ -11,7 +11,7 @@ from .._types import require_x64
 from ..plant import Reconstruction
 from ..records import Record
 from ..reporting import shown_by_default
-from ..structures import Cause, Structure
+from ..structures import AbstractTerm, Cause, Structure
 from ._diagnosis import Diagnosis
 from .advice.detection_limits import Silence, Smallest, detectable, naturally_detectable
 from .advice.next_test import Leading
@@ -20,12 +20,13 @@ from .channels.delays import Late, in_time, showing_late, slightly_late
 from .channels.drift import steadied
 from .evidence.fitted import Trial
 from .evidence.measured import HeldOutRuns, Weighed
-from .evidence.missing_force import residual
+from .evidence.missing_force import Residual, residual
 from .evidence.setup import Problem
 from .evidence.split import HeldOut, split
 from .hypotheses.candidate import Candidate
 from .hypotheses.candidates import chosen_causes
 from .report.assemble import Reached, Tested, assemble
+from .report.sentences import leaves_something
 from .report.unfinished import Unfinished
 from .search.rounds import Searched
 from .search.steps import Progress, Steps
@@ -148,10 +149,8 @@ def _diagnosed(
     steps.next("the missing force")
     term = next(iter(winner.laws), None) if decision.verdict == "cause" else None
     first, fitted, refitted = judged.first, judged.until[0], tried.refitted
-    # Shown beside a law is the force that it stands for, with the own values that go with it.
-    lacking = refitted.structure if term is None else winner.structure.without(term)
-    at = term.at if term is not None and term.at in lacking.links else None
-    missing = residual(lacking, steadied(first), fitted, at)
+    missing = _stands_for(term, winner, refitted, judged)
+    rest = residual(winner.structure, steadied(first), fitted) if leaves_something(decision, winner) else None
     steps.next("what would have been seen")
     seen = _would_have_been_seen(decision.verdict, every, tried, judged)
     if decision.verdict != "consistent":
@@ -160,8 +159,15 @@ def _diagnosed(
     tested = Tested(tried.trials, tried.behind, tried.left_out, seen, tried.lack.known, unfinished)
     leading = Leading.of(model, [refitted, *tried.trials], lambda t: decision.probability(t.key), first, fitted)
     steps.end()
-    reached = Reached(decision, winner, term, weighed.evidence)
+    reached = Reached(decision, winner, term, weighed.evidence, rest)
     return assemble(reached, clipped, refitted, tested, judged, extended, missing, gain, runs, leading)
+
+
+def _stands_for(term: AbstractTerm | None, winner: Trial, refitted: Trial, problem: Problem) -> Residual:
+    """The force that a law stands for, with the own values that go with it; without a law, what the refit lacks."""
+    lacking = refitted.structure if term is None else winner.structure.without(term)
+    at = term.at if term is not None and term.at in lacking.links else None
+    return residual(lacking, steadied(problem.first), problem.until[0], at)
 
 
 def _would_have_been_seen(verdict: str, every: list[Candidate], found: Searched, problem: Problem) -> list[Smallest]:

@@ -24,7 +24,7 @@ from ..verdict.decision import Decision
 from ..verdict.judge import evidence_behind
 from .estimates import Units, noise_by_channel, refitted_values, smallest_effects, unit_of
 from .findings import Ranked, findings_of, fitted_candidate, unfitted_candidate
-from .force_shape import shape_of
+from .force_shape import Shape, shape_of
 from .plain_data import Drawn, jfsm_version, plain_gain, plain_record
 from .sentences import difference_sentence, verdict_advice, verdict_sentence
 from .unfinished import Unfinished
@@ -46,12 +46,14 @@ class Tested(NamedTuple):
 
 
 class Reached(NamedTuple):
-    """The decision, the trial that it rests on, the law that was named, if one was, and all the evidence."""
+    """The decision, the trial that it rests on, the law that was named, if one was, all the evidence, and the force
+    that the named causes leave, if that is not negligible."""
 
     decision: Decision
     winner: Trial
     term: AbstractTerm | None
     evidence: Evidence
+    rest: Residual | None = None
 
     def ranked(self, trials: list[Trial]) -> Ranked:
         """The decision with the hypotheses behind it."""
@@ -83,7 +85,7 @@ def assemble(
     differ = [difference_sentence(one, unit_of(winner.structure, one.path, units)) for one in between]
     notes = tuple(dict.fromkeys(_notes(unfinished, problem, differ, winner, gain)))
     smallest = smallest_effects(tested.seen, units)
-    shape = shape_of(missing) if verdict in ("undecided", "unnamed") else None
+    shape = _shape(missing if verdict in ("undecided", "unnamed") else reached.rest)
     drawn = Drawn(missing, runs, reached.term, first.record, first.period, with_shape=verdict != "consistent")
     sentence = verdict_sentence(decision, reached.winner, findings, gain, shape, differ, imposed=imposed)
     advice = verdict_advice(decision, gain, imposed=imposed)
@@ -113,6 +115,10 @@ def assemble(
         sentence=sentence, advice=advice, told=told, drawn=drawn, leading=leading,
         decision=decision, finished=not unfinished.notes, untried=unfinished.untried,
     )  # fmt: skip
+
+
+def _shape(found: Residual | None) -> Shape | None:
+    return None if found is None else shape_of(found)
 
 
 def _candidates(

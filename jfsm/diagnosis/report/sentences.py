@@ -47,7 +47,7 @@ def verdict_sentence(
         words = f"The form of the model is right, its values are off: {what}.{_trace(decision, winner)}"
         return " ".join([words, *differences]) + gained
     if decision.verdict == "cause":
-        return " ".join([_named(decision, winner, findings), *differences]) + gained
+        return " ".join([_named(decision, winner, findings, shape), *differences]) + gained
     if decision.verdict == "unnamed":
         looks = "" if shape is None else f" {shape.words}"
         return f"A real effect is there that no law of the catalogue explains; a map stands in.{looks}{gained}"
@@ -99,10 +99,10 @@ def _laws(finding: Finding, known: Mapping[str, Cause]) -> str:
     return ", ".join(f"{known[name].label} ({share:.0%})" for name, share in finding.members.items() if name in known)
 
 
-def _named(decision: Decision, winner: Trial, findings: Sequence[Finding]) -> str:
+def _named(decision: Decision, winner: Trial, findings: Sequence[Finding], shape: Shape | None) -> str:
     """The causes that were named, and what remains unexplained or untried."""
     known = dict(causes()) | {e.cause.id: e.cause for e in winner.effects}
-    words = " ".join(finding_sentence(f, known) for f in findings) + _remainder(winner)
+    words = " ".join(finding_sentence(f, known) for f in findings) + _remainder(winner, shape)
     if decision.near == decision.winner:
         words += " Its shape is not quite that of any law that was tried."
     if not decision.finished:
@@ -110,12 +110,18 @@ def _named(decision: Decision, winner: Trial, findings: Sequence[Finding]) -> st
     return words
 
 
-def _remainder(winner: Trial) -> str:
-    """The error that the named causes leave unexplained; empty where it is negligible."""
+def leaves_something(decision: Decision, winner: Trial) -> bool:
+    """Whether the named causes leave more than a negligible error unexplained."""
+    return decision.verdict == "cause" and winner.prediction.left() >= THRESHOLDS.negligible
+
+
+def _remainder(winner: Trial, shape: Shape | None) -> str:
+    """The error that the named causes leave unexplained, and the shape of its force; empty where it is negligible."""
     left = winner.prediction.left()
     if left < THRESHOLDS.negligible:
         return ""
-    return f" Something is left beyond {'them' if len(winner.effects) > 1 else 'it'}: {left:.1%} of the signal."
+    looks = "" if shape is None else f" {shape.words}"
+    return f" Something is left beyond {'them' if len(winner.effects) > 1 else 'it'}: {left:.1%} of the signal.{looks}"
 
 
 def _trace(decision: Decision, winner: Trial) -> str:

@@ -131,6 +131,22 @@ def crossed(found: Sequence[Trial], singles: Sequence[Trial], model: Structure) 
     return tried
 
 
+def twins(t: Trial, among: Sequence[Effect], model: Structure) -> list[Candidate]:
+    """Pairs with what one of their laws really is with the numbers found, in its place: one well is a bent spring."""
+    found = []
+    for which, (effect, part) in enumerate(zip(t.effects, t.parts, strict=True)):
+        if not isinstance(part, AbstractTerm) or not part.otherwise(t.structure.stiffness_of(part.at)):
+            continue
+        numbers = dict(zip((p.name for p in part.parameters), part.values, strict=True))
+        other, kept = t.effects[1 - which], t.parts[1 - which]
+        for twin in (e for e in among if e.at == effect.at and e.cause.effect in part.contains and e != other):
+            names = [p.name for p in twin.cause.effect.parameters]
+            if set(names) <= set(numbers):
+                law = twin.cause.effect(**{name: numbers[name] for name in names}, at=twin.at)
+                found.append(joined(model, other, kept, twin, [law], found_in(t)))
+    return found
+
+
 def _best(found: Sequence[_Pair], most: int) -> list[_Pair]:
     """Those that promise most."""
     told = [(-pair.promise, i) for i, pair in enumerate(found) if pair.promise is not None]

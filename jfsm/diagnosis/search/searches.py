@@ -16,7 +16,7 @@ from ..hypotheses.effect import Effect, families
 from ..hypotheses.initial_values import found_in, own_part
 from ..thresholds import THRESHOLDS
 from .batches import FROM_THERE, Found, Schedule, Tell, batches_of, climbed
-from .pairs import crossed, instead, joined, pairs
+from .pairs import crossed, instead, joined, pairs, twins
 from .related_laws import beside_a_spring, instead_of, late_instead, resting, special_cases
 from .stopping import is_itself
 
@@ -220,7 +220,14 @@ class _PairSearch:
             tried = self._neighbours(leader, found, first=before is self.best)
             found = found.and_then(self.climbed(tried, _INSTEAD, kept=families(leader.effects)))
             before = leader
-        return found
+        return found if self.problem.limit.over else found.and_then(self.climbed(self._twins(found), _INSTEAD))
+
+    def _twins(self, found: Found) -> list[Candidate]:
+        """What pairs really are that are likelier than the leader, and have a law that is not itself."""
+        leader, done = self.leader(found), {t.effects for t in found.trials}
+        ahead = [t for t in found.trials if t.evidence > leader.evidence - _CLOSE and not is_itself(t)]
+        tried = {c.effects: c for t in ahead for c in twins(t, self.effects, self.problem.model)}
+        return [c for effects, c in tried.items() if effects not in done]
 
     def _goes_on(self, leader: Trial, before: Trial) -> bool:
         """Whether the last round gained enough for another one."""

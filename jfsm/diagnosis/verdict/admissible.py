@@ -134,14 +134,19 @@ def is_constant(card: Scorecard) -> bool:
 def _second_effect_pays(card: Scorecard, bench: Bench) -> Reason:
     if len(card.effects) == 1:
         return ""
+    for alone in _to_be_beaten(card, bench):
+        if enough := _is_enough(alone, card, bench):
+            return f"{alone.effects[0].label} alone {enough}"
+    return ""
+
+
+def _to_be_beaten(pair: Scorecard, bench: Bench) -> list[Scorecard]:
+    """Single effects that a pair must be better than: its own, and the best that nothing speaks against, if that has
+    fewer numbers."""
     singles = [alone for alone in bench.apart_from_the_drive if len(alone.effects) == 1]
     passing = [alone for alone in singles if not bench.reasons.get(alone.key)]
     best = max(passing, key=lambda alone: alone.evidence, default=None)
-    for alone in singles:
-        simpler = alone is best and alone.unknowns < card.unknowns
-        if (simpler or alone.effects[0] in card.effects) and (enough := _is_enough(alone, card, bench)):
-            return f"{alone.effects[0].label} alone {enough}"
-    return ""
+    return [c for c in singles if c.effects[0] in pair.effects or (c is best and c.unknowns < pair.unknowns)]
 
 
 def _is_enough(alone: Scorecard, pair: Scorecard, bench: Bench) -> Reason:

@@ -81,8 +81,7 @@ def _decided(evidence: Evidence, limits: Thresholds, long_run: bool) -> Decision
     stands for both.
     """
     decision = decided(Bench(evidence, limits, evidence.candidates, long_run))
-    refused = [c for c in evidence.candidates if len(c.effects) > 1 and decision.reasons[c.key] == WRONG_SHAPE]
-    if decision.verdict == "undecided" and refused and not _near_enough(decision, evidence, limits):
+    if _may_be_one_of_two(decision, evidence, limits):
         singles = [c for c in evidence.candidates if len(c.effects) == 1]
         alone = decided(Bench(evidence, limits, singles, long_run))
         if alone.verdict == "cause" and excess.almost_all(evidence.cards[alone.winner], evidence.refitted, limits):
@@ -95,10 +94,13 @@ def _decided(evidence: Evidence, limits: Thresholds, long_run: bool) -> Decision
     return _same_in_all_records(decision, evidence, limits)
 
 
-def _near_enough(decision: Decision, evidence: Evidence, limits: Thresholds) -> bool:
-    """Whether runs over held-out readings will confirm the class of what is near."""
+def _may_be_one_of_two(decision: Decision, evidence: Evidence, limits: Thresholds) -> bool:
+    """Whether two effects were refused for their shape, and held-out readings do not confirm their classes."""
+    refused = [c for c in evidence.candidates if len(c.effects) > 1 and decision.reasons[c.key] == WRONG_SHAPE]
+    if decision.verdict != "undecided" or not refused:
+        return False
     errors = None if decision.near is None else evidence.held_out(decision.near)
-    return errors is not None and errors.closed >= limits.almost_all
+    return errors is None or errors.closed < limits.almost_all
 
 
 def _same_in_all_records(decision: Decision, evidence: Evidence, limits: Thresholds) -> Decision:

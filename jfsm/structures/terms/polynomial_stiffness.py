@@ -64,6 +64,7 @@ class DoubleWell(AbstractTerm):
     k3: Scalar = eqx.field(converter=as_scalar)
     at: tuple[int, int] = eqx.field(converter=as_link, static=True, kw_only=True)
     kind = "double_well"
+    contains = (CubicStiffness,)
     parameters = (
         Parameter("k_neg", force=1, length=-1, meaning="stiffness lost at the centre"),
         Parameter("k3", force=1, length=-3, meaning="cubic stiffness"),
