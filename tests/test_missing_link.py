@@ -6,7 +6,6 @@ import pytest
 from scipy.signal import cont2discrete, dlsim
 
 import jfsm
-from jfsm.diagnosis.hypotheses.candidates import _without
 
 MASS = np.array([2.0, 1.5])
 SPRINGS, DASHPOTS = [900.0, 700.0], [0.9, 0.7]
@@ -52,6 +51,21 @@ def test_a_link_that_the_model_lacks_is_named_where_it_is(spring: float, dashpot
 
 def test_a_link_is_missing_where_no_spring_of_the_model_is():
     model = jfsm.Structure.chain(np.ones(4), np.ones(4), np.ones(4))
-    assert _without(jfsm.LinearStiffness, model) == [(0, 2), (0, 3), (0, 4), (1, 3), (2, 4)]
-    assert _without(jfsm.LinearDamping, jfsm.Structure([1.0], [jfsm.LinearStiffness(1.0, at=(0, 1))])) == [(0, 1)]
-    assert not _without(jfsm.LinearDamping, jfsm.Structure.sdof(1.0, 1.0, 1.0))
+    assert model.untied(jfsm.LinearStiffness) == [(0, 2), (0, 3), (0, 4), (1, 3), (2, 4)]
+    undamped = jfsm.Structure([1.0], [jfsm.LinearStiffness(1.0, at=(0, 1))])
+    assert undamped.untied(jfsm.LinearDamping) == [(0, 1)]
+    assert not jfsm.Structure.sdof(1.0, 1.0, 1.0).untied(jfsm.LinearDamping)
+
+
+@pytest.mark.parametrize(("spring", "missing"), [(150.0, True), (0.0, False)])
+def test_a_fit_says_where_springs_are_missing(spring: float, missing: bool):
+    found = jfsm.fit(jfsm.Structure.chain(MASS, SPRINGS, DASHPOTS), record(spring, 0.0))
+    assert bool(found.missing) is missing
+    if missing:
+        assert "at 0-2" in found.missing
+
+
+def test_a_fit_with_every_link_misses_none():
+    found = jfsm.fit(jfsm.Structure.chain(MASS, SPRINGS, DASHPOTS) + jfsm.LinearStiffness(150.0, at=(0, 2)),
+                     record(150.0, 0.0))  # fmt: skip
+    assert found.missing == ""

@@ -101,7 +101,7 @@ def fit(
         low, high = found.intervals[path]
         rows.append((path, f"{given.values()[path]:.6g}", f"{value:.6g}", f"[{low:.6g}, {high:.6g}]", unit))
     show_table("Fitted values", ("value", "given", "fitted", "95 % interval", "unit"), rows)
-    for words in found.identifiability:
+    for words in (*found.identifiability, *filter(None, [found.missing])):
         typer.echo(words)
     found.structure.save(out)
     typer.echo(f"The fitted model is in {out}.")

@@ -15,6 +15,7 @@ from ..plant import Reconstruction
 from ..records import Record
 from ..structures import Offset, Structure, is_offset
 from ._maximise import Maximum, approach, finish
+from ._missing_links import missing_links, words_of
 from ._nuisances import Nuisances, prepare_all
 from ._posterior import Hypothesis, Posterior, lanes_of
 from ._starts import natural_starts, starts
@@ -30,6 +31,8 @@ _BEGINNINGS = 4
 _PURSUED = 2
 """Beginnings that are followed to the top."""
 _REFINEMENTS = 3
+_SAID = 3
+"""Missing springs that are said, the surest ones."""
 _LOOSE = 0.5
 """Relative standard error from which a value is hardly determined."""
 
@@ -53,6 +56,9 @@ class Fit:
     noise : dict of channel to float
         Standard deviation of each channel's white noise as found, of the first record.
     result : Result
+    missing : str
+        Springs that the structure does not have, and that would make the records more probable, in words; empty where
+        there are none.
     """
 
     structure: Structure
@@ -63,6 +69,7 @@ class Fit:
     log_likelihood: float
     noise: dict[str, float]
     result: Result
+    missing: str = ""
 
 
 @programs_kept()
@@ -129,7 +136,8 @@ def fit(
         for (kind, j), f, t in zip(prepared[0].channels, prepared[0].floor, _scales(unknowns, theta), strict=False)
     }
     words = _words(unknowns[: len(free)], theta, error, pairs, structure)
-    return Fit(kept, values, intervals, pairs, words, -float(best.value[lane]), noise, best.results[lane])
+    missing = words_of(missing_links(posterior, theta, lane)[:_SAID])
+    return Fit(kept, values, intervals, pairs, words, -float(best.value[lane]), noise, best.results[lane], missing)
 
 
 def sandwich(

@@ -169,6 +169,14 @@ class Structure(eqx.Module):
         """Stiffness of all linear springs of a link together."""
         return sum(float(t.k) for t in self.terms if isinstance(t, LinearStiffness) and set(t.at) == set(link))
 
+    def untied(self, kind: type[AbstractTerm]) -> list[tuple[int, int]]:
+        """Pairs of degrees of freedom that no term of a kind ties: neighbours, theirs, and each with the ground (0)."""
+        tied = {frozenset(t.at) for t in self.terms if isinstance(t, kind)}
+        near = {frozenset(link) for link in self.links}
+        further = {one ^ other for one in near for other in near if len(one & other) == 1}
+        ground = {frozenset((0, j)) for j in range(1, self.dof + 1)}
+        return sorted((min(pair), max(pair)) for pair in (near | further | ground) - tied)
+
     def rests(self) -> list[tuple[tuple[int, int], float]]:
         """Links and the relative displacements, other than none, at which one of their laws lets them rest."""
         return [(law.at, rest) for law in self.terms for rest in law.rests(self.stiffness_of(law.at))]

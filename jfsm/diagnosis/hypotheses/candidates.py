@@ -78,7 +78,7 @@ def _fitted(selection: Mapping[str, Cause], *, imposed: bool) -> list[Cause]:
 def _links(cause: Cause, model: Structure, places: Sequence[tuple] | None) -> list[tuple]:
     """Places of a law: the links; the masses if it hangs on one or loads it from outside."""
     if cause.effect in (LinearStiffness, LinearDamping):
-        return _among(places, _without(cause.effect, model))
+        return _among(places, model.untied(cause.effect))
     masses = [(0, j) for j in range(1, model.dof + 1)]
     if cause.effect.hangs:
         return _among(places, masses)
@@ -88,15 +88,6 @@ def _links(cause: Cause, model: Structure, places: Sequence[tuple] | None) -> li
 def _among(places: Sequence[tuple] | None, possible: Sequence[tuple]) -> list[tuple]:
     """The possible places that were asked for; all of them where none were."""
     return [at for at in possible if places is None or at in places]
-
-
-def _without(kind: type, model: Structure) -> list[tuple[int, int]]:
-    """Masses and their neighbours, and theirs, and the ground, that no linear spring, or dashpot, ties."""
-    tied = {frozenset(t.at) for t in model.terms if isinstance(t, kind)}
-    near = {frozenset(link) for link in model.links}
-    further = {one ^ other for one in near for other in near if len(one & other) == 1}
-    ground = {frozenset((0, j)) for j in range(1, model.dof + 1)}
-    return sorted((min(pair), max(pair)) for pair in (near | further | ground) - tied)
 
 
 def _channels(cause: Cause, model: Structure, records: Sequence[Nuisances]) -> list[tuple[str, int]]:

@@ -1,6 +1,6 @@
 """Two effects at once, where one leaves something: not the best one and then the next, but pairs of good ones."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import chain, combinations, product
 from typing import NamedTuple
 
@@ -134,17 +134,23 @@ def crossed(found: Sequence[Trial], singles: Sequence[Trial], model: Structure) 
 def twins(t: Trial, among: Sequence[Effect], model: Structure) -> list[Candidate]:
     """Pairs with what one of their laws really is with the numbers found, in its place: one well is a bent spring."""
     found = []
-    for which, (effect, part) in enumerate(zip(t.effects, t.parts, strict=True)):
-        if not isinstance(part, AbstractTerm) or not part.otherwise(t.structure.stiffness_of(part.at)):
-            continue
-        numbers = dict(zip((p.name for p in part.parameters), part.values, strict=True))
-        other, kept = t.effects[1 - which], t.parts[1 - which]
-        for twin in (e for e in among if e.at == effect.at and e.cause.effect in part.contains and e != other):
-            names = [p.name for p in twin.cause.effect.parameters]
-            if set(names) <= set(numbers):
-                law = twin.cause.effect(**{name: numbers[name] for name in names}, at=twin.at)
-                found.append(joined(model, other, kept, twin, [law], found_in(t)))
+    for which, part in enumerate(t.parts):
+        if isinstance(part, AbstractTerm) and part.otherwise(t.structure.stiffness_of(part.at)):
+            other, kept = t.effects[1 - which], t.parts[1 - which]
+            for effect, law in _held_by(part, among):
+                if effect != other:
+                    found.append(joined(model, other, kept, effect, [law], found_in(t)))
     return found
+
+
+def _held_by(law: AbstractTerm, among: Sequence[Effect]) -> Iterator[tuple[Effect, AbstractTerm]]:
+    """Special cases of a law, with those of its numbers that they have."""
+    numbers = dict(zip((p.name for p in law.parameters), law.values, strict=True))
+    for effect in among:
+        kind, names = effect.cause.effect, [p.name for p in effect.cause.effect.parameters]
+        if effect.at == law.at and kind in law.contains and set(names) <= set(numbers):
+            if effect.cause.sign * float(numbers[names[0]]) >= 0:
+                yield effect, kind(**{name: numbers[name] for name in names}, at=effect.at)
 
 
 def _best(found: Sequence[_Pair], most: int) -> list[_Pair]:

@@ -29,6 +29,8 @@ _TOGETHER = Schedule((0.03, 0.01), 6, 0.25)
 """Of pairs: one of the two has been fitted already."""
 _INSTEAD = _TOGETHER._replace(to_the_end=True)
 """Of those that share an effect with the best pair,"""
+_TWINS = 4
+"""Pairs with a law that is not itself, at most, of which what they really are is tried."""
 _ROUNDS = 3
 """which are looked for so many times, at most."""
 _ALIKE = 20.0
@@ -223,10 +225,10 @@ class _PairSearch:
         return found if self.problem.limit.over else found.and_then(self.climbed(self._twins(found), _INSTEAD))
 
     def _twins(self, found: Found) -> list[Candidate]:
-        """What pairs really are that are likelier than the leader, and have a law that is not itself."""
-        leader, done = self.leader(found), {t.effects for t in found.trials}
-        ahead = [t for t in found.trials if t.evidence > leader.evidence - _CLOSE and not is_itself(t)]
-        tried = {c.effects: c for t in ahead for c in twins(t, self.effects, self.problem.model)}
+        """What the likeliest pairs really are that have a law that is not itself."""
+        done = {t.effects for t in found.trials}
+        others = sorted((t for t in found.trials if not is_itself(t)), key=lambda t: -t.evidence)[:_TWINS]
+        tried = {c.effects: c for t in others for c in twins(t, self.effects, self.problem.model)}
         return [c for effects, c in tried.items() if effects not in done]
 
     def _goes_on(self, leader: Trial, before: Trial) -> bool:
