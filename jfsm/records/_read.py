@@ -9,6 +9,7 @@ from jfsm.records._record import Record
 from jfsm.records.formats import format_of
 from jfsm.records.formats.lookup import ChannelName
 from jfsm.records.formats.rows import rows_where
+from jfsm.records.formats.runs import chosen_run
 
 
 def read(
@@ -24,6 +25,8 @@ def read(
     sensitivity: Mapping[str, str] | None = None,
     rate: float | None = None,
     where: Mapping[str, str | float] | None = None,
+    run: int | str | None = None,
+    sheet: int | str | None = None,
     at_rest: bool | None = None,
     drive: Drive | None = None,
     name: str | None = None,
@@ -33,13 +36,15 @@ def read(
     Parameters
     ----------
     path : str or Path
-        A file of text (csv, txt, dat, tsv), NumPy (npz), MATLAB (mat), HDF5 (h5, hdf5), a universal file (uff, unv),
-        or with the extras ``jfsm[tdms]`` and ``jfsm[mf4]`` of National Instruments (tdms) and ASAM (mf4, mdf).
+        A file, told by what it holds, whatever its ending: text, LabVIEW, WAV, NumPy, JSON, MATLAB, HDF5, UFF,
+        strong-motion and OpenSim text; with extras (``jfsm[excel]``, ``[tdms]``, ``[mf4]``, ``[parquet]``,
+        ``[ros]``) spreadsheets, TDMS, MDF, Parquet and ROS bags. docs/files.md says what is read of each.
     time : str, optional
-        Name of the column of instants; otherwise the clock that the channels have in the file, then ``time`` or ``t``
-        is looked for, then a single number ``fs`` [Hz] or ``dt`` [s]: beside the channels first, then at the top.
+        Name of the column of instants; otherwise the clock that the channels have in the file, then a column called
+        time, t, Zeit, Timestamp and the like, then a single number ``fs`` [Hz] or ``dt`` [s]: beside the channels
+        first, then around them; at last the rate that the head of the file states.
     force, displacement, velocity, acceleration : str, sequence of str, or {dof: str}, optional
-        Name of the channel: the head of a column (``column 3`` where it has none), a variable, a field
+        Name of the channel: the head of a column with or without its unit, ``column 3`` or ``3``, a variable, a field
         ``struct.field``, a dataset ``group/name``, a node and direction ``3:+Z`` (with the opposite sign if the file
         has it as ``3:-Z``). The columns of a matrix (n, dof) are taken together, or one by one as ``name[0]``,
         ``name[1]``. Without any name the columns called ``force``, ``displacement_2`` and the like are taken, as
@@ -55,6 +60,11 @@ def read(
         Samples per second [Hz] of a file without instants; the clock then begins at 0.
     where : mapping of column to value, optional
         Which rows of a long table to take, as ``{"specimen": "B", "run": 3}``; columns of text may be named, too.
+    run : int or str, optional
+        Which of several runs that follow one another in the file to take, from 1: segments under headings of their
+        own, or stretches between which the clock goes back.
+    sheet : int or str, optional
+        Which sheet of a spreadsheet, by name or number from 1; needed only where several hold numbers.
     at_rest, drive, name : optional
         As for `Record`. By default what the file says, otherwise not at rest, driven by force, and the file's name.
 
@@ -69,8 +79,8 @@ def read(
     ModuleNotFoundError
         If its format needs an extra that is not installed.
     ValueError
-        If the format is not known, a name is not in the file, no row is left by `where`, no clock is found, channels
-        have clocks that differ, or the numbers make no `Record`.
+        If the file is of no kind that is read, several runs or sheets leave a choice, a name is not in the file, no
+        row is left by `where`, no clock is found, channels have clocks that differ, or the numbers make no `Record`.
 
     Notes
     -----
@@ -84,9 +94,7 @@ def read(
     """
     path = Path(path)
     file_format = format_of(path)
-    with path.open("rb"):
-        pass  # a file that is missing or locked is reported as such, whatever a library would make of it
-    contents = file_format.load(path)
+    contents, run = chosen_run(file_format.load(path), path.name, run, sheet)
     return record_of(
         Record,
         rows_where(contents, path.name, where) if where else contents,
@@ -96,6 +104,7 @@ def read(
         units=units or {},
         sensitivity=sensitivity or {},
         rate=rate,
+        run=run,
         at_rest=at_rest,
         drive=drive,
         name=name,

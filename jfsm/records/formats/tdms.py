@@ -5,15 +5,19 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, optional_package, read_only
+from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, optional_package
 
-STEP = "wf_increment"  # property of a channel that has a clock [s]
+STEP, START, OFFSET = "wf_increment", "wf_start_time", "wf_start_offset"  # properties of a channel that has a clock
 
 
 class TdmsFormat(AbstractFormat):
     """Channels by ``group/channel``, with the unit and clock that each of them states. Read only."""
 
+    name: ClassVar[str] = "TDMS"
     suffixes: ClassVar[tuple[str, ...]] = (".tdms",)
+
+    def recognises(self, begins_with: bytes, path: Path) -> bool:
+        return begins_with.startswith((b"TDSm", b"TDSh"))
 
     def load(self, path: Path) -> Contents:
         tdms: Any = optional_package("nptdms", "tdms", path).TdmsFile
@@ -41,17 +45,37 @@ class TdmsFormat(AbstractFormat):
                 group, channel = channels[name].group_name, channels[name].name
                 return np.asarray(opened[group][channel][:])
 
+        starts = {
+            name: np.datetime64(channel.properties[START]).astype("datetime64[ns]")
+            for name, channel in channels.items()
+            if START in channel.properties and STEP in channel.properties
+        }
+        begins = min(starts.values(), default=None)
+
         def clock(name: str) -> np.ndarray:
             channel = channels[name]
-            start = float(channel.properties.get("wf_start_offset", 0.0))
+            start = float(channel.properties.get(OFFSET, 0.0))
+            if begins is not None and name in starts:
+                start += float((starts[name] - begins) / np.timedelta64(1, "ns")) * 1e-9
             return start + np.arange(len(channel)) * float(channel.properties[STEP])
+
+        skipped = [
+            f"{group.name}/{channel.name}"
+            for group in file.groups()
+            for channel in group.channels()
+            if f"{group.name}/{channel.name}" not in channels
+        ]
+        notes = [f"Not numbers, and left out: {', '.join(skipped[:6])}."] if skipped else []
+        if len(set(starts.values())) > 1:
+            notes.append(
+                "The channels of the file began at different instants; their clocks count from the first of them."
+            )
 
         units = {name: str(channel.properties.get("unit_string", "")) for name, channel in channels.items()}
         return Contents(
             Lazy(channels, samples),
             {name: unit for name, unit in units.items() if unit},
             clocks=Lazy([name for name, channel in channels.items() if STEP in channel.properties], clock),
+            notes=tuple(notes),
+            begins=begins,
         )
-
-    def save(self, path: Path, contents: Contents) -> None:
-        raise read_only(path)
