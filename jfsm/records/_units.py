@@ -5,6 +5,8 @@ import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from jfsm.records._unit_words import Dimension, dimension_and_size
+
 RESPONSES = ("displacement", "velocity", "acceleration")
 KINDS = ("force", *RESPONSES, "base_acceleration")
 
@@ -17,32 +19,21 @@ class Unit(NamedTuple):
     coherent: str
 
 
-_INCH, _FOOT, _POUND, _GRAVITY, _DEGREE = 0.0254, 0.3048, 4.4482216152605, 9.80665, 0.017453292519943295
-
-# quantity -> coherent unit, then every accepted spelling (as `_plain` leaves it) with its size in that unit
-_TABLE: dict[str, tuple[str, dict[str, float]]] = {
-    "time": ("s", {"s": 1, "sec": 1, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60}),
-    "length": ("m", {"m": 1, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "in": _INCH, "ft": _FOOT}),
-    "speed": ("m/s", {"m/s": 1, "mm/s": 1e-3, "cm/s": 1e-2, "in/s": _INCH, "ft/s": _FOOT}),
-    "acceleration": (
-        "m/s²",
-        {"m/s2": 1, "mm/s2": 1e-3, "cm/s2": 1e-2, "in/s2": _INCH, "ft/s2": _FOOT, "g": _GRAVITY, "mg": 1e-3 * _GRAVITY},
-    ),
-    "force": (
-        "N",
-        {"N": 1, "mN": 1e-3, "kN": 1e3, "MN": 1e6, "kgf": _GRAVITY, "lbf": _POUND, "lb": _POUND, "kip": 1e3 * _POUND},
-    ),
-    "torque": (
-        "N m",
-        {"Nm": 1, "mNm": 1e-3, "kNm": 1e3, "Nmm": 1e-3, "lbfft": _POUND * _FOOT, "lbfin": _POUND * _INCH},
-    ),
-    "angle": ("rad", {"rad": 1, "mrad": 1e-3, "deg": _DEGREE, "°": _DEGREE, "rev": 360 * _DEGREE}),
-    "rotation_rate": ("rad/s", {"rad/s": 1, "deg/s": _DEGREE, "°/s": _DEGREE, "rpm": 6 * _DEGREE}),
-    "rotation_acceleration": ("rad/s²", {"rad/s2": 1, "deg/s2": _DEGREE, "°/s2": _DEGREE}),
-    "voltage": ("V", {"V": 1, "mV": 1e-3, "uV": 1e-6, "µV": 1e-6, "kV": 1e3}),
-    "current": ("A", {"A": 1, "mA": 1e-3}),
-    "pixels": ("px", {"px": 1}),
-    "number": ("1", {"1": 1, "-": 1}),
+# quantity -> its dimension and its coherent unit
+_QUANTITIES: dict[str, tuple[Dimension, str]] = {
+    "time": (Dimension(time=1), "s"),
+    "length": (Dimension(length=1), "m"),
+    "speed": (Dimension(length=1, time=-1), "m/s"),
+    "acceleration": (Dimension(length=1, time=-2), "m/s²"),
+    "force": (Dimension(force=1), "N"),
+    "torque": (Dimension(force=1, length=1), "N m"),
+    "angle": (Dimension(angle=1), "rad"),
+    "rotation_rate": (Dimension(angle=1, time=-1), "rad/s"),
+    "rotation_acceleration": (Dimension(angle=1, time=-2), "rad/s²"),
+    "voltage": (Dimension(voltage=1), "V"),
+    "current": (Dimension(current=1), "A"),
+    "pixels": (Dimension(pixels=1), "px"),
+    "number": (Dimension(), "1"),
 }
 # Raw readings, good for any kind of channel: an uncalibrated record is a consistent set of its own.
 _RAW = ("voltage", "current", "pixels", "number")
@@ -50,26 +41,44 @@ _LENGTH, _ANGLE = ("length", "speed", "acceleration"), ("angle", "rotation_rate"
 _DEFAULT_FORCE = {"angle": "N m"}
 
 
-def _plain(text: str) -> str:
-    """One spelling for m/s^2, m/s**2, m/s² and N·m, N*m, N m."""
-    for old, new in (("**", ""), ("^", ""), ("²", "2"), ("μ", "µ"), ("·", ""), ("*", ""), (" ", "")):
-        text = text.replace(old, new)
-    return text
-
-
-_UNITS = {
-    spelling: Unit(quantity, factor, coherent)
-    for quantity, (coherent, spellings) in _TABLE.items()
-    for spelling, factor in spellings.items()
-}
 _SUFFIXES = {-2: " s²", -1: " s", 0: "", 1: "/s", 2: "/s²"}  # of a unit, by the number of differentiations
+_BY_DIMENSION = {dimension: (quantity, coherent) for quantity, (dimension, coherent) in _QUANTITIES.items()}
 # What a raw unit becomes under differentiation, so that a written record can be read back.
-_UNITS |= {
-    _plain(_TABLE[quantity][0] + suffix): Unit(quantity + suffix, 1.0, _TABLE[quantity][0] + suffix)
+_BY_DIMENSION |= {
+    dimension.times(Dimension(time=1), -order): (quantity + suffix, coherent + suffix)
     for quantity in _RAW
-    for suffix in _SUFFIXES.values()
-    if suffix
+    for dimension, coherent in [_QUANTITIES[quantity]]
+    for order, suffix in _SUFFIXES.items()
+    if suffix and quantity != "number"
 }
+_NUMBERS = {"1": "", "-": "", "count": "", "counts": "", "digits": ""} | {
+    f"1{suffix}".replace(" ", ""): suffix for suffix in _SUFFIXES.values()
+}
+# Spellings that a message shows; all others are found alike.
+_EXAMPLES = {
+    "time": "s, ms, µs, min",
+    "length": "m, mm, µm, in, ft",
+    "speed": "m/s, mm/s, in/s",
+    "acceleration": "m/s², mm/s², g, mg, in/s²",
+    "force": "N, kN, lbf, kgf, kip",
+    "torque": "N m, kN m, lbf in, lbf ft",
+    "angle": "rad, mrad, deg",
+    "rotation_rate": "rad/s, deg/s, rpm",
+    "rotation_acceleration": "rad/s², deg/s²",
+}
+
+
+def _find(text: str) -> Unit | None:
+    """The unit that a text stands for, None if it is none that is known."""
+    squeezed = text.strip("[] ").replace(" ", "").replace("^", "").replace("s2", "s²").lower()
+    if squeezed in _NUMBERS:
+        suffix = _NUMBERS[squeezed]
+        return Unit("number" + suffix, 1.0, "1" + suffix)
+    found = dimension_and_size(text.strip().removeprefix("[").removesuffix("]"))
+    if found is None or found[0] not in _BY_DIMENSION:
+        return None
+    quantity, coherent = _BY_DIMENSION[found[0]]
+    return Unit(quantity, found[1], coherent)
 
 
 def find_unit(text: str, kind: str) -> Unit:
@@ -80,10 +89,10 @@ def find_unit(text: str, kind: str) -> Unit:
     ValueError
         If the unit is unknown, or is one of another quantity.
     """
-    unit = _UNITS.get(_plain(text)) if isinstance(text, str) else None
+    unit = _find(text) if isinstance(text, str) else None
     allowed = _quantities(kind)
     if unit is None or unit.quantity not in allowed:
-        known = ", ".join(spelling for spelling, other in _UNITS.items() if other.quantity in allowed[:2])
+        known = ", ".join(_EXAMPLES[quantity] for quantity in allowed[:2] if quantity in _EXAMPLES)
         raise ValueError(
             f"`units` of {kind} must be a unit of {' or '.join(allowed[:2])} ({known}) or a raw reading (V, A, px, 1); "
             f"it was {text!r}. Convert the numbers before, and leave the unit out."
@@ -131,7 +140,7 @@ def find_sensitivity(text: str, name: str, kind: str) -> Sensitivity:
 
 def is_unit(text: str) -> bool:
     """Whether this text is the spelling of a unit."""
-    return _plain(text) in _UNITS
+    return bool(text.strip()) and _find(text) is not None
 
 
 def _quantities(kind: str) -> tuple[str, ...]:
