@@ -12,13 +12,18 @@ T = np.arange(100) * 0.02
 U = np.cos(3.0 * T)
 
 
-@pytest.mark.parametrize(("suffix", "package", "extra"), [("tdms", "nptdms", "tdms"), ("mf4", "asammdf", "mf4")])
-def test_a_missing_package_is_named_with_the_line_that_installs_it(tmp_path, monkeypatch, suffix, package, extra):
+@pytest.mark.parametrize(
+    ("suffix", "begins_with", "package", "extra"),
+    [("tdms", b"TDSm", "nptdms", "tdms"), ("mf4", b"MDF     4.10", "asammdf", "mf4")],
+)
+def test_a_missing_package_is_named_with_the_line_that_installs_it(
+    tmp_path, monkeypatch, suffix, begins_with, package, extra
+):
     def missing(name):
         raise ModuleNotFoundError(name)
 
     monkeypatch.setattr(importlib, "import_module", missing)
-    (tmp_path / f"a.{suffix}").touch()
+    (tmp_path / f"a.{suffix}").write_bytes(begins_with)
     message = rf"a\.{suffix} is read by the package {package}, .*Run `pip install jfsm\[{extra}\]`"
     with pytest.raises(ModuleNotFoundError, match=message):
         read(tmp_path / f"a.{suffix}", force="F")
@@ -55,7 +60,7 @@ def test_channels_of_a_tdms_file_have_names_units_and_clocks(tmp_path):
         read(path, force="run/F", acceleration="run/slow")
 
 
-@pytest.mark.parametrize("kept", [0, 10, 1000, -1])
+@pytest.mark.parametrize("kept", [10, 1000, -1])
 def test_a_tdms_file_that_is_cut_short_is_refused(tmp_path, kept):
     path = _tdms(tmp_path / "a.tdms")
     path.write_bytes(path.read_bytes()[:kept])

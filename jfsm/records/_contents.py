@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from jfsm.records._abstract_record import AbstractRecord, AnyRecord, Drive
+from jfsm.records._repeats import repetition
 from jfsm.records._units import KINDS, find_sensitivity, find_unit
 from jfsm.records.formats.base import Contents, point_name
 from jfsm.records.formats.clocks import clock_of
@@ -18,6 +19,8 @@ from jfsm.records.formats.lookup import (
     own_names,
     samples_of,
 )
+from jfsm.records.formats.runs import Run, run_of_clock
+from jfsm.records.formats.ticks import beginnings
 
 
 def contents_of(record: AbstractRecord) -> Contents:
@@ -49,6 +52,7 @@ def record_of(
     sensitivity: Mapping[str, str],
     time: str | None = None,
     rate: float | None = None,
+    run: Run = None,
     at_rest: bool | None = None,
     drive: Drive | None = None,
     name: str | None = None,
@@ -63,11 +67,12 @@ def record_of(
         kind: _by_dof(contents, source, kind, names) for kind, names in (named or own_names(contents, source)).items()
     }
     every = [choice for choices in chosen.values() for choice in choices.values()]
-    clock, column = clock_of(contents, source, every, time, rate)
-    used = every if column is None else [*every, column]
+    clock = clock_of(contents, source, every, time, rate, units)
+    used = [*every, *clock.columns]
     _require_read("units", units, used)
     _require_read("sensitivity", sensitivity, every)
-    stated = {choice: _unit(contents, source, choice, units) for choice in used}
+    stated = {choice: _unit(contents, source, choice, units) for choice in every}
+    assumed = [choice for choice in every if stated[choice] is None and _said(sensitivity, choice) is None]
     factors: dict[Choice, float] = {}
     for choice in every:
         given = _said(sensitivity, choice)
@@ -79,24 +84,69 @@ def record_of(
             stated[choice] = sensor.unit
     channels: dict[str, Any] = {}
     for kind, choices in chosen.items():
-        arrays = {dof: samples_of(contents, source, choice) for dof, choice in choices.items()}
+        arrays = {dof: clock.of_samples(samples_of(contents, source, choice)) for dof, choice in choices.items()}
         for dof in arrays:
             if choices[dof] in factors:
                 arrays[dof] = arrays[dof] * factors[choices[dof]]
         channels[kind] = arrays if None not in arrays else arrays[None]
+    begun = beginnings(clock.seconds)
+    part = (
+        run_of_clock(source, clock.seconds, begun.tolist(), run) if begun.size > 1 or run is not None else slice(None)
+    )
     record = make(
-        clock,
-        **channels,
+        clock.seconds[part],
+        **{kind: _rows(samples, part, clock.seconds.size) for kind, samples in channels.items()},
         units=_one_for_each_kind(source, stated),
         at_rest=contents.about.get("at_rest", False) if at_rest is None else at_rest,
         drive=drive or contents.about.get("drive", "force"),
         name=contents.about.get("name", default_name) if name is None else name,
     )
-    notes = [*contents.about.get("notes", ()), *contents.notes]
+    notes = [*contents.about.get("notes", ()), *contents.notes, *clock.notes]
+    if clock.begins is not None:
+        notes.append(f"The clock reads zero at {str(clock.begins).replace('T', ' ')}.")
+    if part != slice(None):
+        notes.append(f"Run {begun.tolist().index(part.start) + 1} of {begun.size} that follow one another in {source}.")
+    if assumed and not contents.about:
+        notes.append(_assumed(assumed, record.units))
+    notes += _held(source, {choice.name: samples_of(contents, source, choice) for choice in every})
     if not named and contents.points and not contents.about:
         numbered = (f"{dof} is {point_name(*point)}" for point, dof in dofs_of_points(contents).items())
         notes.append(f"Degrees of freedom by node and direction: {', '.join(numbered)}.")
     return record.noted(*notes)
+
+
+def _rows(samples: Any, part: slice, size: int) -> Any:
+    """The samples of one run."""
+    if part == slice(None):
+        return samples
+    if isinstance(samples, dict):
+        return {dof: _rows(column, part, size) for dof, column in samples.items()}
+    return samples[part] if np.shape(samples)[:1] == (size,) else samples
+
+
+def _assumed(choices: Sequence[Choice], units: Mapping[str, str]) -> str:
+    """What units channels are taken to be in."""
+    said = ", ".join(f"{choice.name!r} is taken to be in {units[choice.kind]}" for choice in choices[:6])
+    return f"Units are not stated: {said}{f', and {len(choices) - 6} more' if len(choices) > 6 else ''}."
+
+
+def _held(source: str, samples: Mapping[str, Any]) -> list[str]:
+    """Columns that hold each value for several rows, where others do not."""
+    columns = {
+        name: np.asarray(column) for name, column in samples.items() if column.ndim == 1 and column.dtype.kind in "iuf"
+    }
+    moves = {name: np.count_nonzero(column[1:] != column[:-1]) for name, column in columns.items()}
+    lengths = {
+        name: repetition(column) if len(columns) > 1 and moves[name] < 0.6 * column.size else 1
+        for name, column in columns.items()
+    }
+    if len(set(lengths.values())) < 2:
+        return []
+    return [
+        f"{name!r} holds every value for {length} samples: it was sampled more slowly than the others."
+        for name, length in lengths.items()
+        if length > 1
+    ]
 
 
 def _by_dof(contents: Contents, source: str, kind: str, names: ChannelName) -> dict[int | None, Choice]:

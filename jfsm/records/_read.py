@@ -9,6 +9,7 @@ from jfsm.records._record import Record
 from jfsm.records.formats import format_of
 from jfsm.records.formats.lookup import ChannelName
 from jfsm.records.formats.rows import rows_where
+from jfsm.records.formats.runs import chosen_run
 
 
 def read(
@@ -24,6 +25,8 @@ def read(
     sensitivity: Mapping[str, str] | None = None,
     rate: float | None = None,
     where: Mapping[str, str | float] | None = None,
+    run: int | str | None = None,
+    sheet: int | str | None = None,
     at_rest: bool | None = None,
     drive: Drive | None = None,
     name: str | None = None,
@@ -55,6 +58,11 @@ def read(
         Samples per second [Hz] of a file without instants; the clock then begins at 0.
     where : mapping of column to value, optional
         Which rows of a long table to take, as ``{"specimen": "B", "run": 3}``; columns of text may be named, too.
+    run : int or str, optional
+        Which of several runs that follow one another in the file to take, from 1: segments under headings of their
+        own, or stretches between which the clock goes back.
+    sheet : int or str, optional
+        Which sheet of a spreadsheet, by name or number from 1; needed only where several hold numbers.
     at_rest, drive, name : optional
         As for `Record`. By default what the file says, otherwise not at rest, driven by force, and the file's name.
 
@@ -84,9 +92,7 @@ def read(
     """
     path = Path(path)
     file_format = format_of(path)
-    with path.open("rb"):
-        pass  # a file that is missing or locked is reported as such, whatever a library would make of it
-    contents = file_format.load(path)
+    contents, run = chosen_run(file_format.load(path), path.name, run, sheet)
     return record_of(
         Record,
         rows_where(contents, path.name, where) if where else contents,
@@ -96,6 +102,7 @@ def read(
         units=units or {},
         sensitivity=sensitivity or {},
         rate=rate,
+        run=run,
         at_rest=at_rest,
         drive=drive,
         name=name,

@@ -7,12 +7,12 @@ from pathlib import Path
 
 from jfsm.records._abstract_record import AbstractRecord
 from jfsm.records._contents import contents_of
-from jfsm.records.formats import format_of
+from jfsm.records.formats import format_to_write
 
 
 def write(record: AbstractRecord, path: Path) -> None:
     """Write a record in the format of the suffix; the file replaces an older one only when it is complete."""
-    file_format = format_of(path)
+    file_format = format_to_write(path)
     # A name beside the target, so that the last step is a rename; same suffix, for libraries that append a missing one.
     unfinished = path.with_name(f".{path.stem}-{uuid.uuid4().hex}{path.suffix}")
     try:

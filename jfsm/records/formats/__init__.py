@@ -1,4 +1,4 @@
-"""File formats, by suffix. A new one is a file in this folder and a line here."""
+"""File formats, told by what a file holds. A new one is a file in this folder and a line here."""
 
 from pathlib import Path
 
@@ -8,23 +8,50 @@ from jfsm.records.formats.hdf5 import Hdf5Format
 from jfsm.records.formats.mat import MatFormat
 from jfsm.records.formats.mdf import MdfFormat
 from jfsm.records.formats.npz import NpzFormat
+from jfsm.records.formats.strangers import is_stranger, refusal
 from jfsm.records.formats.tdms import TdmsFormat
 from jfsm.records.formats.text import TextFormat
 from jfsm.records.formats.uff import UffFormat
 
+# The first that recognises a file reads it; text, which is told by not being anything else, comes last.
 FORMATS: tuple[AbstractFormat, ...] = (
-    TextFormat(),
     NpzFormat(),
     MatFormat(),
     Hdf5Format(),
     UffFormat(),
     TdmsFormat(),
     MdfFormat(),
+    TextFormat(),
 )
+
+BEGINNING = 4096  # bytes by which a file is told
 
 
 def format_of(path: Path) -> AbstractFormat:
-    """The format that a file's suffix stands for.
+    """The format of a file, by its first bytes.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        If it is of none that is read.
+    """
+    with path.open("rb") as stream:
+        begins_with = stream.read(BEGINNING)
+    if not begins_with:
+        raise ValueError(f"{path.name} is empty. Write or copy it again.")
+    for candidate in FORMATS[:-1]:
+        if candidate.recognises(begins_with, path):
+            return candidate
+    meant = next((each.name for each in FORMATS[:-1] if path.suffix.lower() in each.suffixes), None)
+    if is_stranger(begins_with) or not FORMATS[-1].recognises(begins_with, path):
+        raise refusal(begins_with, path, meant)
+    return FORMATS[-1]
+
+
+def format_to_write(path: Path) -> AbstractFormat:
+    """The format that a file's ending stands for.
 
     Raises
     ------
@@ -35,4 +62,4 @@ def format_of(path: Path) -> AbstractFormat:
         if path.suffix.lower() in candidate.suffixes:
             return candidate
     known = " ".join(suffix for candidate in FORMATS for suffix in candidate.suffixes)
-    raise ValueError(f"`path` must end in one of {known}; it was {path.name!r}. Rename or convert the file.")
+    raise ValueError(f"`path` must end in one of {known}; it was {path.name!r}. Choose another ending.")

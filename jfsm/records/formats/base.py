@@ -5,7 +5,7 @@ import importlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,13 @@ class Lazy(Mapping[str, NDArray[Any]]):
         return name in self._names  # the inherited test would read the array
 
 
+class StatedRate(NamedTuple):
+    """A sampling rate [Hz] and the words in which the file states it."""
+
+    hertz: float
+    words: str
+
+
 @dataclass(frozen=True)
 class Contents:
     """Named arrays of one file, before anyone has said what they mean.
@@ -56,6 +63,18 @@ class Contents:
         What else the file says that a reader of the record should know, one sentence each.
     texts : mapping of name to (n,) array of str
         Columns as written, of a table in which some may be text.
+    aliases : mapping of text to names
+        What else the file calls its arrays (a whole heading, a label). A text that stands for several is none's name.
+    rate : StatedRate or None
+        Samples per second of all channels that have no instants.
+    begins : datetime64 or None
+        The instant at which the clocks of the file read zero.
+    runs : sequence of Contents
+        Where the file holds several tables, each of them, with its `title`; `arrays` is then empty.
+    runs_are : "run" or "sheet"
+        What they are called.
+    title : str
+        What tells this one of several from the others, as "400 rows from line 23 on".
     """
 
     arrays: Mapping[str, NDArray[Any]]
@@ -66,20 +85,45 @@ class Contents:
     points: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     texts: Mapping[str, NDArray[np.str_]] = field(default_factory=dict)
+    aliases: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    rate: StatedRate | None = None
+    begins: np.datetime64 | None = None
+    runs: tuple["Contents", ...] = ()
+    runs_are: str = "run"
+    title: str = ""
 
 
 class AbstractFormat(abc.ABC):
-    """One kind of file."""
+    """One kind of file.
 
+    A reader reads samples when they are asked for, says in `notes` what it skips or assumes, writes nothing beside the
+    file, asks nothing and evaluates no text; a file that it cannot read it refuses in one sentence.
+    """
+
+    name: ClassVar[str]
+    """What such a file is called in a message."""
     suffixes: ClassVar[tuple[str, ...]]
+    """Endings that mean this format where a record is written."""
+
+    @abc.abstractmethod
+    def recognises(self, begins_with: bytes, path: Path) -> bool:
+        """Whether a file whose first bytes (4096, or all) are these is of this kind, whatever its ending."""
 
     @abc.abstractmethod
     def load(self, path: Path) -> Contents:
         """Everything numeric in the file."""
 
-    @abc.abstractmethod
     def save(self, path: Path, contents: Contents) -> None:
-        """Write the contents so that `load` gives them back exactly."""
+        """Write the contents so that `load` gives them back exactly.
+
+        Raises
+        ------
+        ValueError
+            If the format is only read.
+        """
+        raise ValueError(
+            f"`path` must end in a format that can be written; {path.suffix} is only read. Write .h5 or .uff."
+        )
 
 
 ABOUT = "jfsm_record"  # the name under which binary formats keep `units` and `about`, as JSON
@@ -117,10 +161,3 @@ def optional_package(module: str, extra: str, path: Path) -> Any:
         raise ModuleNotFoundError(
             f"{path.name} is read by the package {module}, which is not installed. Run `pip install jfsm[{extra}]`."
         ) from error
-
-
-def read_only(path: Path) -> ValueError:
-    """The refusal to write a format that is only read."""
-    return ValueError(
-        f"`path` must end in a format that can be written; {path.suffix} is only read. Write .h5 or .uff."
-    )

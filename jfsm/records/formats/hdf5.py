@@ -13,13 +13,18 @@ from jfsm.records.formats.base import ABOUT, AbstractFormat, Contents, Lazy
 if TYPE_CHECKING:
     import h5py
 
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
 NUMERIC = "iufcb"  # kinds of dtype that hold numbers
 
 
 class Hdf5Format(AbstractFormat):
     """Datasets by path, ``group/name``; a field of a table as ``group/table.field``; units by attribute."""
 
+    name: ClassVar[str] = "HDF5"
     suffixes: ClassVar[tuple[str, ...]] = (".h5", ".hdf5")
+
+    def recognises(self, begins_with: bytes, path: Path) -> bool:
+        return any(begins_with[place:].startswith(SIGNATURE) for place in (0, 512, 1024, 2048))
 
     def load(self, path: Path) -> Contents:
         units: dict[str, str] = {}

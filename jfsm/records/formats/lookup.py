@@ -50,9 +50,15 @@ def choose(contents: Contents, source: str, kind: str, name: str) -> Choice:
     ValueError
         If there is none.
     """
-    match = None if name in contents.arrays else _COLUMN.match(name)
+    match = None if name in contents.arrays or name in contents.aliases else _COLUMN.match(name)
     base, column = (match["name"], int(match["column"])) if match else (name, None)
-    for array, sign in ((base, 1.0), (_reversed(base), -1.0)):
+    meant = _meant(contents, base)
+    if len(meant) > 1:
+        raise ValueError(
+            f"`{kind}` must name one channel of {source}; {name!r} may be {' or '.join(map(repr, meant))}. Name one of "
+            f"them."
+        )
+    for array, sign in ((meant[0] if meant else base, 1.0), (_reversed(base), -1.0)):
         for candidate in (array, f"{array} {kind}"):
             if candidate in contents.arrays:
                 return Choice(kind, name, candidate, column, sign)
@@ -61,6 +67,17 @@ def choose(contents: Contents, source: str, kind: str, name: str) -> Choice:
     raise ValueError(
         f"`{kind}` must name a channel of {source}, which holds {listed(contents.arrays)}; it was {name!r}.{hint}"
     )
+
+
+def _meant(contents: Contents, text: str) -> tuple[str, ...]:
+    """The arrays that a text may stand for: by name, by what else the file calls them, or by number from 1."""
+    if text in contents.arrays:
+        return (text,)
+    if text in contents.aliases:
+        return contents.aliases[text]
+    if text.isdigit() and 1 <= int(text) <= len(contents.arrays):
+        return (list(contents.arrays)[int(text) - 1],)
+    return ()
 
 
 def samples_of(contents: Contents, source: str, choice: Choice) -> NDArray[Any]:

@@ -15,7 +15,11 @@ from jfsm.records.formats.hdf5 import NUMERIC, dataset, opened
 class MatFormat(AbstractFormat):
     """Variables by name; a field of a struct as ``struct.field``."""
 
+    name: ClassVar[str] = "MATLAB"
     suffixes: ClassVar[tuple[str, ...]] = (".mat",)
+
+    def recognises(self, begins_with: bytes, path: Path) -> bool:
+        return begins_with.startswith(b"MATLAB ") or _is_version_4(begins_with)
 
     def load(self, path: Path) -> Contents:
         try:
@@ -41,6 +45,23 @@ class MatFormat(AbstractFormat):
         remarks = json.dumps({"units": dict(contents.units), **contents.about})
         variables = {name: np.atleast_1d(array) for name, array in contents.arrays.items()}
         scipy.io.savemat(path, {**variables, ABOUT: remarks}, oned_as="column", do_compression=True)
+
+
+def _is_version_4(begins_with: bytes) -> bool:
+    """Whether a file begins with the header of a matrix of MATLAB 4, whose files have no mark of their own.
+
+    Five integers: the type (thousands for the byte order, tens for the number format), rows, columns, whether complex,
+    and the length of a name that ends in a zero.
+    """
+    for order in ("little", "big"):
+        kind, rows, columns, imaginary, length = (
+            int.from_bytes(begins_with[at : at + 4], order) for at in range(0, 20, 4)
+        )
+        if kind in (0, 10, 20, 30, 40, 50, 1000, 1010, 1020, 1030, 1040, 1050) and imaginary in (0, 1):
+            name = begins_with[20 : 20 + length]
+            if 0 < length < 64 and rows and columns and name.endswith(b"\0") and name[:-1].isalnum():
+                return True
+    return False
 
 
 def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:

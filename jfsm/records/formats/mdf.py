@@ -5,13 +5,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, optional_package, read_only, unique_names
+from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, optional_package, unique_names
 
 
 class MdfFormat(AbstractFormat):
     """Channels by name, with the unit and clock of each. Read only."""
 
+    name: ClassVar[str] = "MDF"
     suffixes: ClassVar[tuple[str, ...]] = (".mf4", ".mdf")
+
+    def recognises(self, begins_with: bytes, path: Path) -> bool:
+        return begins_with.startswith((b"MDF     ", b"UnFinMF "))
 
     def load(self, path: Path) -> Contents:
         mdf: Any = optional_package("asammdf", "mf4", path).MDF
@@ -45,6 +49,3 @@ class MdfFormat(AbstractFormat):
 
         units = {name: unit for name, unit in zip(names, stated, strict=True) if unit}
         return Contents(Lazy(names, samples), units, clocks=Lazy(names, clock))
-
-    def save(self, path: Path, contents: Contents) -> None:
-        raise read_only(path)

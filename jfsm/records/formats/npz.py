@@ -14,7 +14,11 @@ from jfsm.records.formats.base import ABOUT, AbstractFormat, Contents
 class NpzFormat(AbstractFormat):
     """Arrays by name (``numpy.savez``). Pickled objects are not opened."""
 
+    name: ClassVar[str] = "archive of numpy.savez"
     suffixes: ClassVar[tuple[str, ...]] = (".npz",)
+
+    def recognises(self, begins_with: bytes, path: Path) -> bool:
+        return begins_with.startswith(b"PK\x03\x04") and b".npy" in begins_with[:256]
 
     def load(self, path: Path) -> Contents:
         try:

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, optional_package, read_only
+from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, optional_package
 
 STEP = "wf_increment"  # property of a channel that has a clock [s]
 
@@ -13,7 +13,11 @@ STEP = "wf_increment"  # property of a channel that has a clock [s]
 class TdmsFormat(AbstractFormat):
     """Channels by ``group/channel``, with the unit and clock that each of them states. Read only."""
 
+    name: ClassVar[str] = "TDMS"
     suffixes: ClassVar[tuple[str, ...]] = (".tdms",)
+
+    def recognises(self, begins_with: bytes, path: Path) -> bool:
+        return begins_with.startswith((b"TDSm", b"TDSh"))
 
     def load(self, path: Path) -> Contents:
         tdms: Any = optional_package("nptdms", "tdms", path).TdmsFile
@@ -52,6 +56,3 @@ class TdmsFormat(AbstractFormat):
             {name: unit for name, unit in units.items() if unit},
             clocks=Lazy([name for name, channel in channels.items() if STEP in channel.properties], clock),
         )
-
-    def save(self, path: Path, contents: Contents) -> None:
-        raise read_only(path)

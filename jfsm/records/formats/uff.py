@@ -1,5 +1,6 @@
 """Universal files (UFF, UNV): what is read of them. How they are written is in `uff_writing`."""
 
+import re
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -24,7 +25,11 @@ class UffFormat(AbstractFormat):
     name of its first description line. Units are those of the label of the ordinate, else of dataset 164.
     """
 
+    name: ClassVar[str] = "universal file (UFF)"
     suffixes: ClassVar[tuple[str, ...]] = (".uff", ".unv")
+
+    def recognises(self, begins_with: bytes, path: Path) -> bool:
+        return re.match(rb"\s*-1\s*\r?\n\s*\d+[b ]?", begins_with) is not None
 
     def load(self, path: Path) -> Contents:
         import pyuff  # loaded when a file asks for it, so that importing jfsm stays quick

@@ -1,0 +1,186 @@
+"""What a table of text and the lines around it say."""
+
+import json
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from jfsm.records.formats.base import Contents, Lazy
+from jfsm.records.formats.headings import Headings, headings_of
+from jfsm.records.formats.numbers import is_number
+from jfsm.records.formats.preambles import stated_rate
+from jfsm.records.formats.text.layout import Layout, fields_of, is_comment, layout_of
+from jfsm.records.formats.text.lines import Line, TextFile
+from jfsm.records.formats.text.table import Segment, Table
+
+MARK = "# jfsm record "  # opens the line on which a written record keeps what is no column
+SHOWN = 3  # lines that a note quotes
+FEW = 2  # rows that a table at least has; fewer among more rows are a remark
+
+
+def text_contents(path: Path) -> Contents:
+    """The columns of a text file, or its runs where titles or headings stand between rows.
+
+    Raises
+    ------
+    ValueError
+        If it holds no table of numbers, or a row has a wrong number of fields.
+    """
+    file = TextFile(path)
+    layout = layout_of(file)
+    table = Table(file, layout)
+    segments, notes = _worthy(table.segments)
+    if not segments:
+        raise ValueError(f"{path.name} must hold columns of numbers; it holds no two rows of them. Export numbers.")
+    notes += _around(segments, file)
+    described = _Described(table, layout, path)
+    if len(segments) == 1:
+        return described.contents(segments[0], segments[0], notes)
+    return Contents({}, runs=tuple(described.contents(segment, segments[0], notes) for segment in segments))
+
+
+class _Described:
+    """Segments of a table with names."""
+
+    def __init__(self, table: Table, layout: Layout, path: Path):
+        self._table, self._layout, self._path = table, layout, path
+
+    def contents(self, segment: Segment, first: Segment, notes: Sequence[str]) -> Contents:
+        """What one segment holds; one without headings has those of the first."""
+        layout, table = self._layout, self._table
+        last_is_empty = not layout.numeric[-1] and not any(table.texts(segment, layout.width - 1)[:100])
+        width = layout.width - int(layout.width > 1 and last_is_empty)
+        headings, understood = self._headings(segment, width)
+        if not understood and segment is not first:
+            headings, understood = self._headings(first, width)
+        names = headings.names
+        about = next((_about(line) for _, line in segment.above if line.startswith(MARK)), {})
+        rate = stated_rate(line for _, line in segment.above if not line.startswith(MARK))
+        said = [*notes, *headings.notes, *self._unread(segment, headings, understood, rate and rate.words, width)]
+
+        def column(name: str) -> np.ndarray:
+            place = names.index(name)
+            if place in segment.text or not layout.numeric[place]:
+                number, found = segment.text.get(place, (segment.first, str(table.texts(segment, place)[0])))
+                raise ValueError(
+                    f"{self._path.name} must hold numbers in column {name!r}; line {number} holds {found!r}. "
+                    f"Repair or remove that line, or read another column."
+                )
+            return table.column(segment, place)
+
+        return Contents(
+            Lazy(names, column),
+            headings.units,
+            about,
+            notes=tuple(said),
+            texts=Lazy(names, lambda name: table.texts(segment, names.index(name))),
+            aliases=headings.aliases,
+            rate=rate,
+            title=f"{segment.count} rows from line {segment.first} on",
+        )
+
+    def _headings(self, segment: Segment, width: int) -> tuple[Headings, dict[int, str]]:
+        """Headings, and the lines that they were read from."""
+        plain = [(number, line) for number, line in segment.above if not is_comment(line)]
+        hidden = [
+            (number, line.strip().lstrip("#%/!; "))
+            for number, line in segment.above
+            if is_comment(line) and not line.startswith(MARK)
+        ]
+        for lines in (plain, hidden):
+            headings = headings_of([self._divided(line, width) for _, line in lines], width)
+            if headings.used:
+                return headings, {lines[place][0]: lines[place][1] for place in headings.used}
+        self._require_unambiguous(plain or hidden, width)
+        return headings_of([], width), {}
+
+    def _divided(self, line: str, width: int) -> list[str]:
+        """The fields of a heading; where blanks divide the rows, they may stand within a name, too."""
+        if self._layout.delimiter is not None:
+            return fields_of(line, self._layout.delimiter)
+        for pattern in (r"\s+", r"\t+|\s{2,}", r"\s+(?![\[(])", r"\s*[,;]\s*"):
+            fields = [field for field in re.split(pattern, line.strip()) if field]
+            if len(fields) == width:
+                return [field.strip('"') for field in fields]
+        return line.split()
+
+    def _require_unambiguous(self, above: Sequence[Line], width: int) -> None:
+        """Refuse rows of twice as many fields as there are names: their commas may be decimal ones."""
+        if self._layout.delimiter != "," or not self._layout.integers or not above:
+            return
+        names = [field for field in fields_of(above[-1][1], ",") if field]
+        if 1 < len(names) < width <= 2 * len(names) and not any(map(is_number, names)):
+            raise ValueError(
+                f"{self._path.name} has {len(names)} names ({', '.join(names)}) above rows of {width} fields; its "
+                f"commas may stand between fields and within numbers. Write it with semicolons between the fields, or "
+                f"with decimal points."
+            )
+
+    def _unread(
+        self, segment: Segment, headings: Headings, understood: dict[int, str], rate: str | None, width: int
+    ) -> list[str]:
+        """What stands above the table and is not used."""
+        left = [
+            (number, line)
+            for number, line in segment.above
+            if number not in understood
+            and not line.startswith(MARK)
+            and not line.lower().startswith("sep=")
+            and not (rate and rate in " ".join(line.split()))
+        ]
+        notes: list[str] = []
+        rows = [
+            (number, line)
+            for number, line in left
+            if not is_comment(line) and 2 * sum(map(is_number, fields_of(line, self._layout.delimiter))) > width
+        ]
+        if rows:
+            notes.append(f"Rows above the table hold numbers and are left out: {_quoted(rows)}.")
+        words = [line for line in left if line not in rows]
+        if words:
+            notes.append(f"Not understood above the table: {_quoted(words)}.")
+        if width > 1 and not headings.used:
+            notes.append("No row of names was found above the table; its columns are numbered.")
+        return notes
+
+
+def _worthy(segments: Sequence[Segment]) -> tuple[list[Segment], list[str]]:
+    """Segments that are tables; single rows among them are said aloud."""
+    kept = [segment for segment in segments if segment.count >= FEW]
+    notes = [
+        f"Line {segment.first} holds numbers but stands alone, and is left out."
+        for segment in segments
+        if segment.count < FEW and kept
+    ]
+    for before, after in zip(segments[:-1], segments[1:], strict=True):
+        if before.count < FEW and after.count >= FEW:
+            after.above = [*before.above, *after.above]
+    return kept, notes
+
+
+def _around(segments: Sequence[Segment], file: TextFile) -> list[str]:
+    """What stands in and below the tables and is no row of them."""
+    notes: list[str] = []
+    below = segments[-1].below
+    if below:
+        notes.append(f"Left out below the table: {_quoted(below)}.")
+    elif not file.ends_in_a_line:
+        notes.append("The last line has no end: its last number may be cut short.")
+    comments = [line for segment in segments for line in segment.comments]
+    if comments:
+        notes.append(f"{len(comments)} remarks between the rows are left out: {_quoted(comments)}.")
+    extra = [line for segment in segments for line in segment.extra]
+    if extra:
+        notes.append(f"{len(extra)} rows have a field too many, which is left out: {_quoted(extra)}.")
+    return notes
+
+
+def _quoted(lines: Sequence[Line]) -> str:
+    shown = ", ".join(f"line {number} {line.strip()[:50]!r}" for number, line in lines[:SHOWN])
+    return shown + (f" and {len(lines) - SHOWN} more" if len(lines) > SHOWN else "")
+
+
+def _about(line: str) -> dict:
+    return json.loads(line.removeprefix(MARK))
