@@ -112,7 +112,7 @@ class Sensitivity(NamedTuple):
 
 
 _SENSITIVITY = re.compile(
-    r"^\s*(?P<size>[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?)\s*(?P<reading>[^\d\s/]+)\s*/\s*(?P<unit>.+?)\s*$"
+    r"^\s*(?P<size>[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?)\s*(?P<reading>1|[^\d\s/]+)?\s*/\s*(?P<unit>.+?)\s*$"
 )
 
 
@@ -126,7 +126,7 @@ def find_sensitivity(text: str, name: str, kind: str) -> Sensitivity:
     """
     match = _SENSITIVITY.match(text) if isinstance(text, str) else None
     if match is not None:
-        given = Sensitivity(float(match["size"]), match["reading"], match["unit"].strip("()"))
+        given = Sensitivity(float(match["size"]), match["reading"] or "1", match["unit"].strip("()"))
         with contextlib.suppress(ValueError):
             is_raw = find_unit(given.reading, kind).quantity in _RAW
             is_of_kind = find_unit(given.unit, kind).quantity not in _RAW

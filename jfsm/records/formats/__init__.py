@@ -2,16 +2,22 @@
 
 from pathlib import Path
 
+from jfsm.records.formats.arrow import ArrowFormat
 from jfsm.records.formats.base import AbstractFormat
 from jfsm.records.formats.base import Contents as Contents
 from jfsm.records.formats.hdf5 import Hdf5Format
+from jfsm.records.formats.json_columns import JsonFormat
+from jfsm.records.formats.lvm import LvmFormat
 from jfsm.records.formats.mat import MatFormat
 from jfsm.records.formats.mdf import MdfFormat
+from jfsm.records.formats.npy import NpyFormat
 from jfsm.records.formats.npz import NpzFormat
+from jfsm.records.formats.spreadsheet import SpreadsheetFormat
 from jfsm.records.formats.strangers import is_stranger, refusal
 from jfsm.records.formats.tdms import TdmsFormat
 from jfsm.records.formats.text import TextFormat
 from jfsm.records.formats.uff import UffFormat
+from jfsm.records.formats.wav import WavFormat
 
 # The first that recognises a file reads it; text, which is told by not being anything else, comes last.
 FORMATS: tuple[AbstractFormat, ...] = (
@@ -21,6 +27,12 @@ FORMATS: tuple[AbstractFormat, ...] = (
     UffFormat(),
     TdmsFormat(),
     MdfFormat(),
+    NpyFormat(),
+    WavFormat(),
+    SpreadsheetFormat(),
+    ArrowFormat(),
+    LvmFormat(),
+    JsonFormat(),
     TextFormat(),
 )
 

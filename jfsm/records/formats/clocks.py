@@ -82,8 +82,8 @@ def clock_of(
         if clock.seconds is not common.seconds and not np.array_equal(clock.seconds, common.seconds):
             raise ValueError(
                 f"{source} must have channels of one clock to make one record; {first.array!r} "
-                f"{_described(common.seconds)}, {choice.array!r} {_described(clock.seconds)}. Read them into a "
-                f"record each, and bring these to one clock by jfsm.align(records); or pass rate=... [Hz] if the "
+                f"{_described(common.seconds)}, {choice.array!r} {_described(clock.seconds)}. "
+                f"{_apart(contents, common, clock)}Read them into a record each, and bring these to one clock by jfsm.align(records); or pass rate=... [Hz] if the "
                 f"file is wrong."
             )
     return common._replace(notes=(*common.notes, *finder.doubts(common)))
@@ -329,6 +329,15 @@ def _counted(contents: Contents, source: str, chosen: Sequence[Choice], rate: fl
         raise ValueError(f"`rate` must be a positive number of samples per second; it was {rate}. Pass rate=... [Hz].")
     size = samples_of(contents, source, chosen[0]).shape[0] if chosen else 0
     return np.arange(size) / rate
+
+
+def _apart(contents: Contents, one: Clock, other: Clock) -> str:
+    """How far apart two clocks begin, and from when they count, if the file states it."""
+    if contents.begins is None or not one.seconds.size or not other.seconds.size:
+        return ""
+    starts = (contents.begins + np.timedelta64(round(float(clock.seconds[0]) * 1e9), "ns") for clock in (one, other))
+    begun = " and ".join(str(start).replace("T", " ") for start in starts)
+    return f"They begin at {begun}, {abs(other.seconds[0] - one.seconds[0]):.9g} s apart. "
 
 
 def _described(clock: Seconds) -> str:

@@ -1,7 +1,6 @@
 """MATLAB files, of version 7.3 (which are HDF5) and before."""
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -32,14 +31,11 @@ class MatFormat(AbstractFormat):
                 f"Write or copy it again."
             ) from error
         remarks = json.loads(str(variables.pop(ABOUT))) if ABOUT in variables else {}
-        arrays: dict[str, np.ndarray] = {}
-        units: dict[str, str] = {}
+        found = _Found()
         for name, value in variables.items():
             if not name.startswith("__"):
-                for path_name, leaf in _leaves(name, value):
-                    arrays[path_name] = np.asarray(leaf)
-        units.update(remarks.pop("units", {}))
-        return Contents(arrays, units, remarks)
+                found.take(name, value)
+        return found.contents(remarks, path)
 
     def save(self, path: Path, contents: Contents) -> None:
         remarks = json.dumps({"units": dict(contents.units), **contents.about})
@@ -64,13 +60,80 @@ def _is_version_4(begins_with: bytes) -> bool:
     return False
 
 
-def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """The numeric arrays below a variable, with their dotted names."""
-    if hasattr(value, "_fieldnames"):
-        for field in value._fieldnames:
-            yield from _leaves(f"{name}.{field}", getattr(value, field))
-    elif isinstance(value, int | float | np.ndarray | np.number) and np.asarray(value).dtype.kind in NUMERIC:
-        yield name, value
+class _Found:
+    """What lies below the variables of a file: numbers by dotted name, their labels and units, and what was skipped."""
+
+    def __init__(self) -> None:
+        self._arrays: dict[str, np.ndarray] = {}
+        self._units: dict[str, str] = {}
+        self._labels: dict[str, list[str]] = {}
+        self._skipped: list[str] = []
+
+    def take(self, name: str, value: Any) -> None:
+        """Take up one value and what it is made of: fields of structs, elements of cells and of arrays of structs."""
+        if hasattr(value, "_fieldnames"):
+            self._describe(name, value)
+            for field in value._fieldnames:
+                self.take(f"{name}.{field}", getattr(value, field))
+        elif isinstance(value, np.ndarray) and value.dtype.kind == "O":
+            for place, item in enumerate(value.ravel(order="F"), start=1):
+                self.take(f"{name}{{{place}}}", item)
+        elif isinstance(value, int | float | np.ndarray | np.number) and np.asarray(value).dtype.kind in NUMERIC:
+            if np.size(value):
+                self._arrays[name] = np.asarray(value)
+        elif not isinstance(value, str) and not (isinstance(value, np.ndarray) and value.dtype.kind in "US"):
+            self._skipped.append(f"{name} ({_class_name(value)})")
+
+    def contents(self, remarks: dict[str, Any], path: Path) -> Contents:
+        """The contents of the file.
+
+        Raises
+        ------
+        ValueError
+            If nothing in it can be read, with what was skipped.
+        """
+        skipped = f"Not read of {path.name}: {', '.join(self._skipped[:8])}" if self._skipped else ""
+        if skipped and not self._arrays:
+            raise ValueError(
+                f"{path.name} must hold arrays or structs of numbers; {skipped}. Save the numbers in MATLAB, as "
+                f"s.time = x.Time; s.data = x.Data."
+            )
+        units = {name: unit for name, unit in self._units.items() if name in self._arrays}
+        aliases = {text: tuple(n for n in names if n in self._arrays) for text, names in self._labels.items()}
+        return Contents(
+            self._arrays,
+            {**units, **remarks.pop("units", {})},
+            remarks,
+            notes=(skipped + ".",) if skipped else (),
+            aliases={text: names for text, names in aliases.items() if names and text not in self._arrays},
+        )
+
+    def _describe(self, name: str, struct: Any) -> None:
+        """Labels and units that stand beside numbers, as Simulink and others put them."""
+        fields = {field.lower(): field for field in struct._fieldnames}
+        holders = [f"{name}.{fields[key]}" for key in ("values", "data", "y", "value") if key in fields]
+        for key in ("label", "name", "signalname"):
+            text = getattr(struct, fields[key]) if key in fields else ""
+            if isinstance(text, str) and text.strip():
+                for holder in holders:
+                    self._labels.setdefault(text.strip(), []).append(holder)
+        for key in ("unit", "units"):
+            text = getattr(struct, fields[key]) if key in fields else ""
+            if isinstance(text, str) and text.strip():
+                for holder in holders:
+                    self._units[holder] = text.strip()
+
+
+def _class_name(value: Any) -> str:
+    """What MATLAB calls the class of something that is not read."""
+    kind = type(value).__name__
+    if isinstance(value, scipy.io.matlab.MatlabFunction):
+        return "a function"
+    if isinstance(value, scipy.io.matlab.MatlabOpaque):
+        names = [item for row in value for item in row if isinstance(item, str | bytes)] if value.size else []
+        known = [n.decode() if isinstance(n, bytes) else n for n in names if n not in ("MCOS", b"MCOS")]
+        return f"an object of class {known[-1]}" if known else "an object"
+    return kind
 
 
 def _version_7_3(path: Path) -> Contents:

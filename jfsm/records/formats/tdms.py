@@ -7,7 +7,7 @@ import numpy as np
 
 from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, optional_package
 
-STEP = "wf_increment"  # property of a channel that has a clock [s]
+STEP, START, OFFSET = "wf_increment", "wf_start_time", "wf_start_offset"  # properties of a channel that has a clock
 
 
 class TdmsFormat(AbstractFormat):
@@ -45,14 +45,37 @@ class TdmsFormat(AbstractFormat):
                 group, channel = channels[name].group_name, channels[name].name
                 return np.asarray(opened[group][channel][:])
 
+        starts = {
+            name: np.datetime64(channel.properties[START]).astype("datetime64[ns]")
+            for name, channel in channels.items()
+            if START in channel.properties and STEP in channel.properties
+        }
+        begins = min(starts.values(), default=None)
+
         def clock(name: str) -> np.ndarray:
             channel = channels[name]
-            start = float(channel.properties.get("wf_start_offset", 0.0))
+            start = float(channel.properties.get(OFFSET, 0.0))
+            if begins is not None and name in starts:
+                start += float((starts[name] - begins) / np.timedelta64(1, "ns")) * 1e-9
             return start + np.arange(len(channel)) * float(channel.properties[STEP])
+
+        skipped = [
+            f"{group.name}/{channel.name}"
+            for group in file.groups()
+            for channel in group.channels()
+            if f"{group.name}/{channel.name}" not in channels
+        ]
+        notes = [f"Not numbers, and left out: {', '.join(skipped[:6])}."] if skipped else []
+        if len(set(starts.values())) > 1:
+            notes.append(
+                "The channels of the file began at different instants; their clocks count from the first of them."
+            )
 
         units = {name: str(channel.properties.get("unit_string", "")) for name, channel in channels.items()}
         return Contents(
             Lazy(channels, samples),
             {name: unit for name, unit in units.items() if unit},
             clocks=Lazy([name for name, channel in channels.items() if STEP in channel.properties], clock),
+            notes=tuple(notes),
+            begins=begins,
         )
