@@ -12,8 +12,11 @@ from jfsm.records.formats.mat import MatFormat
 from jfsm.records.formats.mdf import MdfFormat
 from jfsm.records.formats.npy import NpyFormat
 from jfsm.records.formats.npz import NpzFormat
+from jfsm.records.formats.opensim import OpenSimFormat
+from jfsm.records.formats.scopes import RigolFormat, TektronixFormat
 from jfsm.records.formats.spreadsheet import SpreadsheetFormat
 from jfsm.records.formats.strangers import is_stranger, refusal
+from jfsm.records.formats.strong_motion import CosmosFormat, KnetFormat, PeerFormat
 from jfsm.records.formats.tdms import TdmsFormat
 from jfsm.records.formats.text import TextFormat
 from jfsm.records.formats.uff import UffFormat
@@ -33,6 +36,12 @@ FORMATS: tuple[AbstractFormat, ...] = (
     ArrowFormat(),
     LvmFormat(),
     JsonFormat(),
+    PeerFormat(),
+    CosmosFormat(),
+    KnetFormat(),
+    OpenSimFormat(),
+    TektronixFormat(),
+    RigolFormat(),
     TextFormat(),
 )
 

@@ -83,8 +83,8 @@ def clock_of(
             raise ValueError(
                 f"{source} must have channels of one clock to make one record; {first.array!r} "
                 f"{_described(common.seconds)}, {choice.array!r} {_described(clock.seconds)}. "
-                f"{_apart(contents, common, clock)}Read them into a record each, and bring these to one clock by jfsm.align(records); or pass rate=... [Hz] if the "
-                f"file is wrong."
+                f"{_apart(contents, common, clock)}Read them into a record each, and bring these to one clock by "
+                f"jfsm.align(records); or pass rate=... [Hz] if the file is wrong."
             )
     return common._replace(notes=(*common.notes, *finder.doubts(common)))
 

@@ -4,7 +4,7 @@ import contextlib
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -29,18 +29,29 @@ class Hdf5Format(AbstractFormat):
     def load(self, path: Path) -> Contents:
         units: dict[str, str] = {}
         places: dict[str, tuple[str, str | None]] = {}  # name -> dataset and, in a table, field
+        packed: dict[str, _Packing] = {}
+        notes: list[str] = []
+        skipped: list[str] = []
 
         def visit(name: str, item: Any) -> None:
             if not hasattr(item, "dtype") or item.shape is None:
+                return
+            if item.external:
+                skipped.append(f"{name} (stored outside the file)")
                 return
             if item.dtype.kind in NUMERIC:
                 places[name] = name, None
             for column in item.dtype.names or ():
                 if item.dtype[column].kind in NUMERIC:
                     places[f"{name}.{column}"] = name, column
-            unit = item.attrs.get("units", item.attrs.get("unit"))
-            if isinstance(unit, str | bytes):
-                units[name] = unit.decode() if isinstance(unit, bytes) else unit
+            unit = _word(item.attrs.get("units", item.attrs.get("unit")))
+            if unit:
+                units[name] = unit
+            if item.dtype.kind not in NUMERIC and not item.dtype.names:
+                skipped.append(name)
+            if packing := _packing(item):
+                packed[name] = packing
+                notes.append(f"{name!r} is packed; its numbers are unpacked by {packing.words}.")
 
         with opened(path, f"{path.name} must be an HDF5 file") as file:
             file.visititems(visit)
@@ -49,9 +60,14 @@ class Hdf5Format(AbstractFormat):
         def array(name: str) -> np.ndarray:
             place, column = places[name]
             with opened(path, f"{path.name} must be an HDF5 file") as file:
-                return dataset(file, place) if column is None else dataset(file, place)[column]
+                values = dataset(file, place)
+            if place in packed:
+                return packed[place].unpacked(values)
+            return values if column is None else values[column]
 
-        return Contents(Lazy(places, array), units, about)
+        if skipped:
+            notes.append(f"Left out: {', '.join(skipped[:6])}.")
+        return Contents(Lazy(places, array), units, about, notes=tuple(notes))
 
     def save(self, path: Path, contents: Contents) -> None:
         import h5py
@@ -61,6 +77,52 @@ class Hdf5Format(AbstractFormat):
             for name, array in contents.arrays.items():
                 file.create_dataset(name, data=array)
                 file[name].attrs["units"] = contents.units.get(name, "1")
+
+
+class _Packing(NamedTuple):
+    """How numbers are kept as integers: value = offset + scale × integer, and which integers stand for gaps."""
+
+    scale: float
+    offset: float
+    gaps: tuple[float, ...]
+
+    @property
+    def words(self) -> str:
+        """Scale, offset and gaps in words."""
+        gaps = f", {', '.join(f'{gap:g}' for gap in self.gaps)} being gaps" if self.gaps else ""
+        return f"scale_factor {self.scale:g} and add_offset {self.offset:g}{gaps}"
+
+    def unpacked(self, values: np.ndarray) -> np.ndarray:
+        """The numbers that are meant."""
+        result = self.offset + self.scale * values.astype(np.float64)
+        for gap in self.gaps:
+            result[values == gap] = np.nan
+        return result
+
+
+def _packing(item: Any) -> _Packing | None:
+    """How a dataset is packed, by the attributes of netCDF's conventions; None if it is not."""
+    keys = ("scale_factor", "add_offset", "_FillValue", "missing_value")
+    given = {key: np.ravel(item.attrs[key]) for key in keys if key in item.attrs}
+    given = {key: value for key, value in given.items() if value.size and value.dtype.kind in "iuf"}
+    if not given or item.dtype.kind not in "iuf":
+        return None
+    gaps = [float(gap) for key in keys[2:] for gap in given.get(key, ()) if np.isfinite(gap)]
+    if not gaps and not set(given) & set(keys[:2]):
+        return None
+    scale, offset = (
+        float(given[key][0]) if key in given else default for key, default in ((keys[0], 1.0), (keys[1], 0.0))
+    )
+    return _Packing(scale, offset, tuple(dict.fromkeys(gaps)))
+
+
+def _word(attribute: Any) -> str:
+    """The text of an attribute of any type: str, bytes, or an array of one of them."""
+    if isinstance(attribute, np.ndarray) and attribute.size == 1:
+        attribute = attribute.ravel()[0]
+    if isinstance(attribute, bytes):
+        attribute = attribute.decode("utf-8", "replace")
+    return attribute.strip() if isinstance(attribute, str) else ""
 
 
 @contextlib.contextmanager
