@@ -31,7 +31,8 @@ _TIME_NAMES = tuple(
         rf"(?:[ ._-]*{_UNIT})?",
     )
 )
-AGREES = 0.01  # relative difference of two statements of one rate that is worth no word
+_FREQUENCY = re.compile(r"(?:freq|frequency|frequenz|fr[ée]quence|f)(?:[ _]*hz)?|hz", re.IGNORECASE)
+AGREES = 0.005  # relative difference of two statements of one rate that is worth no word
 
 
 class Clock(NamedTuple):
@@ -121,6 +122,12 @@ class _Finder:
             return self._once(
                 (stated, size),
                 lambda: Clock(_counted(contents, self._source, [choice], stated.hertz), (), contents.begins, (note,)),
+            )
+        over = next((name for name in contents.arrays if _FREQUENCY.fullmatch(name.strip())), None)
+        if over is not None:
+            raise ValueError(
+                f"{self._source} holds a spectrum over {over!r} and no instants; a record holds samples over time. "
+                f'the samples over time, or pass time="..." or rate=... [Hz] if it is none.'
             )
         raise ValueError(
             f"{self._source} must say when its samples were taken; it holds {listed(contents.arrays)}. "

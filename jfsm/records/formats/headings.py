@@ -44,6 +44,12 @@ def headings_of(above: Sequence[Sequence[str]], width: int) -> Headings:
     """
     fitting = {place: _fitted(row, width) for place, row in enumerate(above)}
     rows = [(place, row) for place, row in fitting.items() if row is not None]
+    rows = [
+        (place, row)
+        for at, (place, row) in enumerate(rows)
+        if not any(_VALUE.match(field) for field in row)
+        or (at + 2 == len(rows) and are_units(rows[at + 1][1]) and not all(_VALUE.match(field) for field in row))
+    ]
     texts, units, used, notes = [""] * width, [""] * width, set(), list[str]()
     if rows:
         last = len(rows) - 1
@@ -113,12 +119,11 @@ def _inside(group: re.Match[str]) -> str:
 
 
 def _fitted(row: Sequence[str], width: int) -> list[str] | None:
-    """A row cut or filled up to the width, None if it cannot be a heading of such a table."""
+    """A row cut to the width, None if it cannot be a heading of such a table."""
     fields = [field.strip() for field in row]
-    if any(fields[width:]) or not any(fields) or (len(fields) < width and width - len(fields) > 1):
+    if any(fields[width:]) or not any(fields) or len(fields) < width:
         return None
-    fields = (fields + [""] * width)[:width]
-    return None if any(_VALUE.match(field) for field in fields) else fields
+    return fields[:width]
 
 
 def _distinct(bare: Sequence[str], texts: Sequence[str]) -> list[str]:

@@ -135,11 +135,16 @@ def dofs_of_points(contents: Contents) -> dict[tuple[int, int], int]:
     return {point: dof for dof, point in enumerate(sorted(measured), start=1)}
 
 
-def _by_kind(contents: Contents) -> dict[str, dict[int, str]]:
+def _by_kind(contents: Contents) -> dict[str, Any]:
     """Channels of known kind; nothing when two of one kind were measured at one place."""
     dofs = dofs_of_points(contents)
-    found: dict[str, dict[int, str]] = {}
+    found: dict[str, Any] = {}
     for name, kind in contents.kinds.items():
+        if kind == "base_acceleration":
+            if kind in found:
+                return {}
+            found[kind] = name
+            continue
         of_kind = found.setdefault(kind, {})
         node, way = contents.points.get(name, (0, 0))
         dof = dofs[node, abs(way)] if name in contents.points else len(of_kind) + 1

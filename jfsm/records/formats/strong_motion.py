@@ -42,11 +42,12 @@ class PeerFormat(AbstractFormat):
             raise ValueError(
                 f"{path.name} must hold the {count} samples that it announces; it holds {values.size}. Copy it again."
             )
+        name = f"ground {quantity}"
         return Contents(
-            {quantity: values},
-            {quantity: unit[1].strip(".,")} if unit else {},
-            clocks={quantity: _counted(step, count)},
-            kinds={quantity: _QUANTITIES[quantity]},
+            {name: values},
+            {name: unit[1].strip(".,")} if unit else {},
+            clocks={name: _counted(step, count)},
+            kinds={name: "base_acceleration"} if quantity == "acceleration" else {},
             notes=tuple(f"The file says: {line.strip()!r}." for line in lines[1:2] if line.strip()),
         )
 

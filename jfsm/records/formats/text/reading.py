@@ -99,7 +99,8 @@ class _Described:
     def _divided(self, line: str, width: int) -> list[str]:
         """The fields of a heading; where blanks divide the rows, they may stand within a name, too."""
         if self._layout.delimiter is not None:
-            return fields_of(line, self._layout.delimiter)
+            fields = fields_of(line, self._layout.delimiter)
+            return [*fields, ""] if len(fields) == width - 1 and not self._layout.numeric[width - 1] else fields
         for pattern in (r"\s+", r"\t+|\s{2,}", r"\s+(?![\[(])", r"\s*[,;]\s*"):
             fields = [field for field in re.split(pattern, line.strip()) if field]
             if len(fields) == width:
