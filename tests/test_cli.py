@@ -326,7 +326,7 @@ def test_an_unknown_channel_is_named_beside_those_that_exist(folder):
             "--where must be a column and its value, as run=3, each column once; it was t.",
         ),
         (["--displacement", "y", "--where", "t=0", "--where", "t=1"], "each column once; it was t=0, t=1."),
-        (["--displacement", "y", "--where", "run=3"], "`where` must name a channel of run.csv"),
+        (["--displacement", "y", "--where", "run=3"], "--where must name a channel of run.csv"),
         (["--displacement", "0=y"], "dof"),
         ([], "must be told which channel is what"),
     ],
@@ -679,3 +679,49 @@ def test_one_run_is_taken_out_of_a_long_table(tmp_path):
     path.write_text("specimen,run,t,y\n" + "\n".join(rows) + "\n", encoding="utf-8")
     told = flat(run("inspect", path, "--displacement", "y", "--where", "run=2", "--where", "specimen=B").output)
     assert "Rows with run = 2.0 and specimen = B: 200 of 400." in told
+
+
+def _runs(path):
+    rows = "".join(f"{0.1 * i:.1f},{i},{2 * i}\n" for i in range(12))
+    path.write_text("time [s],F [kN],x [mV]\n" + rows + rows)
+    return path
+
+
+def test_refusals_of_a_file_speak_of_options(tmp_path):
+    path = _runs(tmp_path / "a.log")
+    assert "--run must name one of the 2 runs of a.log" in (line := refusal("inspect", path, "--force", "F"))
+    assert line.endswith("Pass --run 1 or another.")
+    (tmp_path / "b.csv").write_text("F,x\n1,2\n2,3\n3,4\n")
+    assert refusal("inspect", tmp_path / "b.csv", "--force", "F").endswith("Pass --time NAME or --rate HZ.")
+    assert "as --force NAME, --displacement NAME" in refusal("inspect", tmp_path / "b.csv", "--rate", 10)
+    (tmp_path / "c.csv").write_text("t,F [EU]\n1,2\n2,3\n3,4\n")
+    assert "Say which is meant by --unit 'F=UNIT'" in refusal("inspect", tmp_path / "c.csv", "--force", "F")
+    uneven = "".join(f"{i + 0.3 * (i % 2)},{i}\n" for i in range(12))
+    (tmp_path / "d.csv").write_text("t [s],F\n" + uneven)
+    Structure.sdof(1.0, 9.0, 0.1).save(tmp_path / "m.toml")
+    options = ["--force", "F", "--model", tmp_path / "m.toml", "--out", tmp_path / "o.csv"]
+    assert "Make them so first: --resample " in refusal("simulate", tmp_path / "d.csv", *options)
+
+
+def test_runs_sensitivities_cuts_and_rates_are_options(tmp_path):
+    path = _runs(tmp_path / "a.log")
+    options = ["--force", "F", "--displacement", "3", "--sensitivity", "3=2 mV/mm", "--run", 2]
+    result = run("inspect", path, *options, "--since", 0.2, "--until", 0.9, "--resample", "auto")
+    assert (result.exit_code, result.stderr) == (0, "")
+    words = flat(result.stdout)
+    assert "8 samples, 0.7000 s, 10 Hz" in words and "Run 2 of 2" in words
+    assert "--resample must be a rate in Hz or auto; it was 'often'" in refusal(
+        "inspect", path, *options, "--resample", "often"
+    )
+    assert "--sensitivity must be a channel and its sensitivity" in refusal(
+        "inspect", path, "--force", "F", "--sensitivity", "x"
+    )
+
+
+def test_a_package_that_is_missing_is_a_refusal(tmp_path, monkeypatch):
+    def missing(module):
+        raise ModuleNotFoundError(module)
+
+    monkeypatch.setattr("jfsm.records.formats.base.importlib.import_module", missing)
+    (tmp_path / "a.tdms").write_bytes(b"TDSm" + bytes(40))
+    assert "pip install jfsm[tdms]" in refusal("inspect", tmp_path / "a.tdms", "--force", "F")

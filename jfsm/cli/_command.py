@@ -10,6 +10,7 @@ from typing import Any
 import typer
 
 from .._programs import settings
+from ._input import in_options
 from ._output import say
 
 FOUND, BAD_INPUT, NOT_FINISHED = 1, 2, 3
@@ -32,7 +33,7 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
             function(**options)
         except BrokenPipeError:  # whoever read the output has seen enough; typer ends such a process in silence
             raise
-        except (ValueError, OSError) as error:
+        except (ValueError, OSError, ModuleNotFoundError) as error:
             if not _is_refusal(error):
                 raise
             say(_words(error))
@@ -69,7 +70,7 @@ def _is_refusal(error: Exception) -> bool:
 
 
 def _words(error: Exception) -> str:
-    """What went wrong; of an error of the operating system without its number."""
+    """What went wrong, in the words of the command line; of an error of the operating system without its number."""
     if isinstance(error, OSError) and error.strerror:
         return f"{error.strerror}: {error.filename}"
-    return str(error)
+    return in_options(str(error))

@@ -5,6 +5,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from inspect import Parameter, signature
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -28,7 +29,7 @@ def _argument(metavar: str, text: str) -> Any:
 CHANNELS = "Channels of the record"
 """The panel of the help in which they stand."""
 
-_FORMATS = "csv, txt, npz, mat, h5, uff; tdms and mf4 with the extras."
+_FORMATS = "text, spreadsheet, MATLAB, HDF5, TDMS, ...; told by what it holds (docs/files.md)."
 
 Names = Annotated[list[str] | None, option("Name in the file; once per degree of freedom.", "[DOF=]NAME", CHANNELS)]
 Units = Annotated[list[str] | None, option("Unit of a channel, as y=mm; once per channel.", "NAME=UNIT", CHANNELS)]
@@ -53,6 +54,18 @@ class _Channels:
     rate: Rate = None
     unit: Units = None
     where: Where = None
+    sensitivity: Annotated[
+        list[str] | None,
+        option("Of a channel in raw units, as 'a1=100 mV/g'; once per channel.", "NAME=TEXT", CHANNELS),
+    ] = None
+    run: Annotated[str | None, option("Which of several runs in the file, from 1.", "NUMBER", CHANNELS)] = None
+    sheet: Annotated[str | None, option("Which sheet of a spreadsheet.", "NAME", CHANNELS)] = None
+    since: Annotated[float | None, option("Leave out what comes before this instant.", "SECONDS", CHANNELS)] = None
+    until: Annotated[float | None, option("Leave out what comes after this instant.", "SECONDS", CHANNELS)] = None
+    resample: Annotated[
+        str | None,
+        option("Bring the record to this rate, or to that of its median step (auto).", "HZ|auto", CHANNELS),
+    ] = None
     at_rest: Annotated[
         bool, typer.Option("--at-rest", help="At rest at the first sample.", rich_help_panel=CHANNELS)
     ] = False
@@ -65,7 +78,7 @@ class _Channels:
         from ..records import read
 
         try:
-            return read(
+            record = read(
                 path,
                 force=_channel_names("force", self.force),
                 displacement=_channel_names("displacement", self.displacement),
@@ -76,11 +89,19 @@ class _Channels:
                 rate=self.rate,
                 units=units(self.unit),
                 where=_where(self.where),
+                sensitivity=_sensitivities(self.sensitivity),
+                run=self.run,
+                sheet=self.sheet,
                 at_rest=self.at_rest or None,  # without the option, what the file says
                 drive=self.drive,  # pyright: ignore[reportArgumentType]  # refused there unless it is one of the two
             )
         except TypeError as error:  # from what the file holds; a TypeError of any later step is a mistake of ours
             raise ValueError(f"{path}: {error}") from error
+        if self.since is not None:
+            record = record.since(self.since)
+        if self.until is not None:
+            record = record.until(self.until)
+        return record if self.resample is None else record.resample(_rate(self.resample, record))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -202,6 +223,49 @@ def _channel_names(kind: str, given: Sequence[str] | None) -> str | list[str] | 
             f"{', '.join(given)}."
         )
     return names
+
+
+def in_options(message: str) -> str:
+    """A message in the words of the command line: ``--time NAME`` for ``time="..."``, ``--unit y=mm`` for units."""
+    for pattern, replacement in _IN_OPTIONS:
+        message = re.sub(pattern, replacement, message)
+    return message
+
+
+_KINDS = "force|displacement|velocity|acceleration"
+_IN_OPTIONS = (
+    (r"\bunits=\{'([^']*)': '([^']*)'\}", r"--unit '\1=\2'"),
+    (r"\bunits=\{'([^']*)': \.\.\.\}", r"--unit '\1=UNIT'"),
+    (r"\btime='([^']*)'", r"--time '\1'"),
+    (r"\btime=\"\.\.\.\"", "--time NAME"),
+    (r"\brate=\.\.\. \[Hz\]", "--rate HZ"),
+    (rf'\b({_KINDS})="\.\.\."', r"--\1 NAME"),
+    (r"\bPass (run|sheet)=(\d+)", r"Pass --\1 \2"),
+    (r"\brecord\.resample\(([^)]*)\)", r"--resample \1"),
+    (r"`units`", "--unit"),
+    (r"`base_acceleration`", "--base-acceleration"),
+    (rf"`({_KINDS}|time|rate|run|sheet|where|sensitivity)`", r"--\1"),
+)
+
+
+def _sensitivities(given: Sequence[str] | None) -> dict[str, str] | None:
+    """Sensitivities by channel, from ``a1=100 mV/g``."""
+    pairs = [text.partition("=") for text in given or ()]
+    for name, _, text in pairs:
+        if not (name and text):
+            raise ValueError(f"--sensitivity must be a channel and its sensitivity, as 'a1=100 mV/g'; it was {name!r}.")
+    return {name: text for name, _, text in pairs} or None
+
+
+def _rate(text: str, record: "Record") -> float:
+    """The rate that is asked for, or that of the median step."""
+    if text == "auto":
+        steps = sorted(after - before for before, after in pairwise(record.time.tolist()))
+        return 1.0 / steps[len(steps) // 2]
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"--resample must be a rate in Hz or auto; it was {text!r}.") from None
 
 
 def _where(given: Sequence[str] | None) -> dict[str, str | float] | None:

@@ -31,7 +31,7 @@ _TIME_NAMES = tuple(
         rf"(?:[ ._-]*{_UNIT})?",
     )
 )
-_FREQUENCY = re.compile(r"(?:freq|frequency|frequenz|fr[ée]quence|f)(?:[ _]*hz)?|hz", re.IGNORECASE)
+_FREQUENCY = re.compile(r"(?:freq|frequency|frequenz|fr[ée]quence)(?:[ _]*hz)?|hz", re.IGNORECASE)
 AGREES = 0.005  # relative difference of two statements of one rate that is worth no word
 
 
@@ -127,7 +127,7 @@ class _Finder:
         if over is not None:
             raise ValueError(
                 f"{self._source} holds a spectrum over {over!r} and no instants; a record holds samples over time. "
-                f'the samples over time, or pass time="..." or rate=... [Hz] if it is none.'
+                f'Export the samples over time, or pass time="..." or rate=... [Hz] if it is none.'
             )
         raise ValueError(
             f"{self._source} must say when its samples were taken; it holds {listed(contents.arrays)}. "
