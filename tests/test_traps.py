@@ -90,6 +90,8 @@ def test_5_five_columns_of_a_ground_motion_are_one_series(tmp_path, npts, called
     np.testing.assert_allclose(record.time, 0.005 * np.arange(17))
     with pytest.raises(ValueError, match=r"must hold the 17 samples that it announces; it holds 16"):
         read(write(tmp_path / called, head + body.replace(values[16], "")))
+    with pytest.raises(ValueError, match=r"must hold numbers alone below its header; line 5 is '# note'\. Repair"):
+        read(write(tmp_path / called, head + "# note\n" + body))
 
 
 def _v2_block(channel, values, unit="cm/sec/sec"):
@@ -408,3 +410,19 @@ def test_15_what_a_matlab_file_holds_beside_numbers_is_named(tmp_path, monkeypat
     del given["F"], given["time"], given["none"]
     with pytest.raises(ValueError, match=r"must hold arrays .*class timeseries.*Save the numbers in MATLAB"):
         read(tmp_path / "a.mat", force="F")
+
+
+def test_counts_of_a_japanese_record_are_multiplied_by_the_fraction_it_states(tmp_path):
+    head = "Origin Time       2011/03/11 14:46:00\nLat.              38.103\nRecord Time       2011/03/11 14:46:47\n"
+    head += (
+        "Sampling Freq(Hz) 100Hz\nDuration Time(s)  300\nDir.              N-S\nScale Factor      3920(gal)/6182761\n"
+    )
+    head += "Max. Acc. (gal)   100.0\nMemo.             \n"
+    counts = -23100 + 10 * np.arange(24)
+    body = "\n".join(" ".join(f"{c:8d}" for c in counts[i : i + 8]) for i in range(0, 24, 8)) + "\n"
+    record = read(write(tmp_path / "MYG0041103111446.NS", head + body))
+    np.testing.assert_allclose(np.asarray(record.base_acceleration), 0.01 * counts * 3920 / 6182761)
+    assert record.sample_rate == pytest.approx(100)
+    said(record, r"multiplied by 3920\(gal\)/6182761")
+    with pytest.raises(ValueError, match="must state Scale Factor, Sampling Freq"):
+        read(write(tmp_path / "a.NS", (head + body).replace("3920(gal)/", "")))

@@ -36,13 +36,15 @@ def read(
     Parameters
     ----------
     path : str or Path
-        A file of text (csv, txt, dat, tsv), NumPy (npz), MATLAB (mat), HDF5 (h5, hdf5), a universal file (uff, unv),
-        or with the extras ``jfsm[tdms]`` and ``jfsm[mf4]`` of National Instruments (tdms) and ASAM (mf4, mdf).
+        A file, told by what it holds, whatever its ending: text, LabVIEW, WAV, NumPy, JSON, MATLAB, HDF5, UFF,
+        strong-motion and OpenSim text; with extras (``jfsm[excel]``, ``[tdms]``, ``[mf4]``, ``[parquet]``) spreadsheets,
+        TDMS, MDF and Parquet. docs/files.md says what is read of each.
     time : str, optional
-        Name of the column of instants; otherwise the clock that the channels have in the file, then ``time`` or ``t``
-        is looked for, then a single number ``fs`` [Hz] or ``dt`` [s]: beside the channels first, then at the top.
+        Name of the column of instants; otherwise the clock that the channels have in the file, then a column called
+        time, t, Zeit, Timestamp and the like, then a single number ``fs`` [Hz] or ``dt`` [s]: beside the channels first,
+        then around them; at last the rate that the head of the file states.
     force, displacement, velocity, acceleration : str, sequence of str, or {dof: str}, optional
-        Name of the channel: the head of a column (``column 3`` where it has none), a variable, a field
+        Name of the channel: the head of a column with or without its unit, ``column 3`` or ``3``, a variable, a field
         ``struct.field``, a dataset ``group/name``, a node and direction ``3:+Z`` (with the opposite sign if the file
         has it as ``3:-Z``). The columns of a matrix (n, dof) are taken together, or one by one as ``name[0]``,
         ``name[1]``. Without any name the columns called ``force``, ``displacement_2`` and the like are taken, as
@@ -77,7 +79,7 @@ def read(
     ModuleNotFoundError
         If its format needs an extra that is not installed.
     ValueError
-        If the format is not known, a name is not in the file, no row is left by `where`, no clock is found, channels
+        If the file is of no kind that is read, several runs or sheets leave a choice, a name is not in the file, no row is left by `where`, no clock is found, channels
         have clocks that differ, or the numbers make no `Record`.
 
     Notes

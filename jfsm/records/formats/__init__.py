@@ -82,5 +82,6 @@ def format_to_write(path: Path) -> AbstractFormat:
     for candidate in FORMATS:
         if path.suffix.lower() in candidate.suffixes:
             return candidate
-    known = " ".join(suffix for candidate in FORMATS for suffix in candidate.suffixes)
+    writing = [candidate for candidate in FORMATS if type(candidate).save is not AbstractFormat.save]
+    known = " ".join(suffix for candidate in writing for suffix in candidate.suffixes)
     raise ValueError(f"`path` must end in one of {known}; it was {path.name!r}. Choose another ending.")

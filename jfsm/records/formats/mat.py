@@ -12,7 +12,7 @@ from jfsm.records.formats.hdf5 import NUMERIC, dataset, opened
 
 
 class MatFormat(AbstractFormat):
-    """Variables by name; a field of a struct as ``struct.field``."""
+    """Variables by name; ``struct.field``, ``cell{2}``, ``structs{2}.field``; labels and units that stand beside numbers."""
 
     name: ClassVar[str] = "MATLAB"
     suffixes: ClassVar[tuple[str, ...]] = (".mat",)

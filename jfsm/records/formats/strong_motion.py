@@ -37,7 +37,7 @@ class PeerFormat(AbstractFormat):
         words = " ".join(lines[:place])
         quantity = next((word for word in _QUANTITIES if word in words.lower()), "acceleration")
         unit = re.search(r"UNITS?\s+(?:OF|IN)\s+(\S+)", words, re.IGNORECASE)
-        values = np.array([float(text) for line in lines[place + 1 :] for text in line.split()])
+        values = _numbers(lines, place + 1, path)
         if values.size != count:
             raise ValueError(
                 f"{path.name} must hold the {count} samples that it announces; it holds {values.size}. Copy it again."
@@ -145,7 +145,7 @@ class KnetFormat(AbstractFormat):
             raise ValueError(
                 f"{path.name} must state Scale Factor, Sampling Freq(Hz) and Memo, as K-NET files do. Copy it again."
             )
-        counts = np.array([float(text) for line in lines[start + 1 :] for text in line.split()])
+        counts = _numbers(lines, start + 1, path)
         values = counts * float(scale[1]) / float(scale[3])
         name = head.get("Dir.", "acceleration").replace("-", "") or "acceleration"
         begun = head.get("Record Time", "")
@@ -186,6 +186,26 @@ def _announced(lines: Sequence[str]) -> tuple[int, int, float] | None:
         if match:
             return place, int(match[1]), float(match[2])
     return None
+
+
+def _numbers(lines: Sequence[str], first: int, path: Path) -> NDArray[np.float64]:
+    """All numbers of the lines from one on.
+
+    Raises
+    ------
+    ValueError
+        If something else stands among them.
+    """
+    values: list[float] = []
+    for number, line in enumerate(lines[first:], start=first + 1):
+        try:
+            values += [float(text) for text in line.split()]
+        except ValueError as error:
+            raise ValueError(
+                f"{path.name} must hold numbers alone below its header; line {number} is {line.strip()[:60]!r}. Repair "
+                f"or remove that line."
+            ) from error
+    return np.array(values)
 
 
 def _cut(lines: Sequence[str], count: int, width: int | None) -> np.ndarray:
