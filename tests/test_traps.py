@@ -3,6 +3,7 @@
 import re
 import struct
 import wave
+from typing import Any
 
 import h5py
 import numpy as np
@@ -426,3 +427,45 @@ def test_counts_of_a_japanese_record_are_multiplied_by_the_fraction_it_states(tm
     said(record, r"multiplied by 3920\(gal\)/6182761")
     with pytest.raises(ValueError, match="must state Scale Factor, Sampling Freq"):
         read(write(tmp_path / "a.NS", (head + body).replace("3920(gal)/", "")))
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "factor"),
+    [
+        ("force_kN", "force", 1e3),
+        ("x_mm", "displacement", 1e-3),
+        ("disp um", "displacement", 1e-6),
+        ("theta_deg", "displacement", np.pi / 180),
+        ("acc_mg", "acceleration", 9.80665e-3),
+        ("acc_mm_s2", "acceleration", 1e-3),
+        ("y_in", "displacement", 1.0),
+        ("a_g", "acceleration", 1.0),
+        ("force_mm", "force", 1.0),
+    ],
+)
+def test_a_unit_that_ends_a_name_is_taken_with_a_note(tmp_path, name, kind, factor):
+    arrays: dict[str, Any] = {"time": 0.1 * np.arange(5), name: np.arange(5.0)}
+    np.savez(tmp_path / "a.npz", **arrays)
+    record = read(tmp_path / "a.npz", **{kind: name})
+    np.testing.assert_allclose(record.channels[kind, 1], factor * np.arange(5))
+    said(record, f"{name}' is taken to be in " + ("" if factor == 1 else ".*, by its name"))
+    record = read(tmp_path / "a.npz", **{kind: name}, units={kind: "V"})
+    np.testing.assert_allclose(record.channels[kind, 1], np.arange(5))
+
+
+def _testlab(values, over="s", unit="g"):
+    return {
+        "x_values": {"start_value": 0.5, "increment": 0.01, "number_of_values": 20.0, "quantity": {"label": over}},
+        "y_values": {"values": values, "quantity": {"label": unit}},
+        "function_record": {"name": "Point:1:+Z"},
+    }
+
+
+def test_15_signals_of_testlab_have_their_axis_and_spectra_are_named(tmp_path):
+    scipy.io.savemat(
+        tmp_path / "a.mat", {"Signal": _testlab(np.arange(20.0)), "FRF": _testlab(np.arange(20.0), over="Hz")}
+    )
+    record = read(tmp_path / "a.mat", acceleration="Signal")
+    np.testing.assert_allclose(record.time, 0.5 + 0.01 * np.arange(20))
+    np.testing.assert_allclose(record.channels["acceleration", 1], 9.80665 * np.arange(20))
+    said(record, r"FRF \(samples over Hz, which is no time\)")

@@ -1,5 +1,7 @@
 """A record from the contents of a file, and as such: which of the arrays is what."""
 
+import contextlib
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -72,6 +74,8 @@ def record_of(
     _require_read("units", units, used)
     _require_read("sensitivity", sensitivity, every)
     stated = {choice: _unit(contents, source, choice, units) for choice in every}
+    named_so = {choice: unit for choice in every if stated[choice] is None and (unit := _unit_in_name(choice))}
+    stated |= named_so
     assumed = [choice for choice in every if stated[choice] is None and _said(sensitivity, choice) is None]
     factors: dict[Choice, float] = {}
     for choice in every:
@@ -106,6 +110,8 @@ def record_of(
         notes.append(f"The clock reads zero at {str(clock.begins).replace('T', ' ')}.")
     if part != slice(None):
         notes.append(f"Run {begun.tolist().index(part.start) + 1} of {begun.size} that follow one another in {source}.")
+    for choice, unit in named_so.items():
+        notes.append(f"{choice.array!r} is taken to be in {unit}, by its name; units= says otherwise.")
     if assumed and not contents.about:
         notes.append(_assumed(assumed, record.units))
     notes += _held(source, {choice.name: samples_of(contents, source, choice) for choice in every})
@@ -198,6 +204,22 @@ def _unit(contents: Contents, source: str, choice: Choice, units: Mapping[str, s
             f"meant by units={{{choice.name!r}: ...}}, or read the channel as what it is."
         ) from error
     return stated
+
+
+_IN_NAME = re.compile(r"[_\s.-](?P<unit>[A-Za-zµ°]{2,}(?:[_/]?s(?:ec)?[\^]?2?)?)$")
+_WORDS = ("in", "min", "rad", "amp", "px", "as", "dm")  # rather words than units at the end of a name
+
+
+def _unit_in_name(choice: Choice) -> str | None:
+    """The unit that ends a channel's name, as of ``force_kN`` and ``x_mm``, if it is one of its kind."""
+    match = _IN_NAME.search(choice.array)
+    if match is None or match["unit"].lower() in _WORDS:
+        return None
+    for unit in (match["unit"], match["unit"].replace("_", "/")):
+        with contextlib.suppress(ValueError):
+            find_unit(unit, choice.kind)
+            return unit
+    return None
 
 
 def _one_for_each_kind(source: str, stated: Mapping[Choice, str | None]) -> dict[str, str]:

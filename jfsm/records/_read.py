@@ -37,12 +37,12 @@ def read(
     ----------
     path : str or Path
         A file, told by what it holds, whatever its ending: text, LabVIEW, WAV, NumPy, JSON, MATLAB, HDF5, UFF,
-        strong-motion and OpenSim text; with extras (``jfsm[excel]``, ``[tdms]``, ``[mf4]``, ``[parquet]``) spreadsheets,
-        TDMS, MDF and Parquet. docs/files.md says what is read of each.
+        strong-motion and OpenSim text; with extras (``jfsm[excel]``, ``[tdms]``, ``[mf4]``, ``[parquet]``)
+        spreadsheets, TDMS, MDF and Parquet. docs/files.md says what is read of each.
     time : str, optional
         Name of the column of instants; otherwise the clock that the channels have in the file, then a column called
-        time, t, Zeit, Timestamp and the like, then a single number ``fs`` [Hz] or ``dt`` [s]: beside the channels first,
-        then around them; at last the rate that the head of the file states.
+        time, t, Zeit, Timestamp and the like, then a single number ``fs`` [Hz] or ``dt`` [s]: beside the channels
+        first, then around them; at last the rate that the head of the file states.
     force, displacement, velocity, acceleration : str, sequence of str, or {dof: str}, optional
         Name of the channel: the head of a column with or without its unit, ``column 3`` or ``3``, a variable, a field
         ``struct.field``, a dataset ``group/name``, a node and direction ``3:+Z`` (with the opposite sign if the file
@@ -79,8 +79,8 @@ def read(
     ModuleNotFoundError
         If its format needs an extra that is not installed.
     ValueError
-        If the file is of no kind that is read, several runs or sheets leave a choice, a name is not in the file, no row is left by `where`, no clock is found, channels
-        have clocks that differ, or the numbers make no `Record`.
+        If the file is of no kind that is read, several runs or sheets leave a choice, a name is not in the file, no
+        row is left by `where`, no clock is found, channels have clocks that differ, or the numbers make no `Record`.
 
     Notes
     -----

@@ -12,7 +12,7 @@ from jfsm.records.formats.hdf5 import NUMERIC, dataset, opened
 
 
 class MatFormat(AbstractFormat):
-    """Variables by name; ``struct.field``, ``cell{2}``, ``structs{2}.field``; labels and units that stand beside numbers."""
+    """Variables by name; ``struct.field``, ``cell{2}``, ``structs{2}.field``; labels and units beside numbers."""
 
     name: ClassVar[str] = "MATLAB"
     suffixes: ClassVar[tuple[str, ...]] = (".mat",)
@@ -68,10 +68,13 @@ class _Found:
         self._units: dict[str, str] = {}
         self._labels: dict[str, list[str]] = {}
         self._skipped: list[str] = []
+        self._clocks: dict[str, np.ndarray] = {}
 
     def take(self, name: str, value: Any) -> None:
         """Take up one value and what it is made of: fields of structs, elements of cells and of arrays of structs."""
-        if hasattr(value, "_fieldnames"):
+        if {"x_values", "y_values"} <= set(getattr(value, "_fieldnames", ())):
+            self._take_testlab(name, value)
+        elif hasattr(value, "_fieldnames"):
             self._describe(name, value)
             for field in value._fieldnames:
                 self.take(f"{name}.{field}", getattr(value, field))
@@ -104,9 +107,27 @@ class _Found:
             self._arrays,
             {**units, **remarks.pop("units", {})},
             remarks,
+            clocks={name: clock for name, clock in self._clocks.items() if name in self._arrays},
             notes=(skipped + ".",) if skipped else (),
             aliases={text: names for text, names in aliases.items() if names and text not in self._arrays},
         )
+
+    def _take_testlab(self, name: str, signal: Any) -> None:
+        """A signal as Simcenter Testlab writes it: samples, and an axis of start, step and number."""
+        axis, ordinate = signal.x_values, signal.y_values
+        over = _text(axis, "quantity", "label") or "s"
+        if over != "s":
+            self._skipped.append(f"{name} (samples over {over}, which is no time)")
+            return
+        values = np.asarray(ordinate.values)
+        columns = values.T if values.ndim == 2 and values.shape[0] < values.shape[1] else values
+        place = f"{name}.y_values.values"
+        self._arrays[place] = columns
+        start, step = float(getattr(axis, "start_value", 0.0)), float(axis.increment)
+        self._clocks[place] = start + step * np.arange(columns.shape[0])
+        if unit := _text(ordinate, "quantity", "label"):
+            self._units[place] = unit
+        self._labels.setdefault(name, []).append(place)
 
     def _describe(self, name: str, struct: Any) -> None:
         """Labels and units that stand beside numbers, as Simulink and others put them."""
@@ -122,6 +143,13 @@ class _Found:
             if isinstance(text, str) and text.strip():
                 for holder in holders:
                     self._units[holder] = text.strip()
+
+
+def _text(struct: Any, *fields: str) -> str:
+    """The text at the end of a chain of fields, empty where it breaks off."""
+    for field in fields:
+        struct = getattr(struct, field, "")
+    return struct.strip() if isinstance(struct, str) else ""
 
 
 def _class_name(value: Any) -> str:
