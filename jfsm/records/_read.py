@@ -37,8 +37,8 @@ def read(
     ----------
     path : str or Path
         A file, told by what it holds, whatever its ending: text, LabVIEW, WAV, NumPy, JSON, MATLAB, HDF5, UFF,
-        strong-motion and OpenSim text; with extras (``jfsm[excel]``, ``[tdms]``, ``[mf4]``, ``[parquet]``)
-        spreadsheets, TDMS, MDF and Parquet. docs/files.md says what is read of each.
+        strong-motion and OpenSim text; with extras (``jfsm[excel]``, ``[tdms]``, ``[mf4]``, ``[parquet]``,
+        ``[ros]``) spreadsheets, TDMS, MDF, Parquet and ROS bags. docs/files.md says what is read of each.
     time : str, optional
         Name of the column of instants; otherwise the clock that the channels have in the file, then a column called
         time, t, Zeit, Timestamp and the like, then a single number ``fs`` [Hz] or ``dt`` [s]: beside the channels

@@ -13,6 +13,7 @@ from jfsm.records.formats.mdf import MdfFormat
 from jfsm.records.formats.npy import NpyFormat
 from jfsm.records.formats.npz import NpzFormat
 from jfsm.records.formats.opensim import OpenSimFormat
+from jfsm.records.formats.ros import RosFormat
 from jfsm.records.formats.scopes import RigolFormat, TektronixFormat
 from jfsm.records.formats.spreadsheet import SpreadsheetFormat
 from jfsm.records.formats.strangers import is_stranger, refusal
@@ -34,6 +35,7 @@ FORMATS: tuple[AbstractFormat, ...] = (
     WavFormat(),
     SpreadsheetFormat(),
     ArrowFormat(),
+    RosFormat(),
     LvmFormat(),
     JsonFormat(),
     PeerFormat(),
