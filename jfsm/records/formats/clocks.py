@@ -26,12 +26,13 @@ _TIME_NAMES = tuple(
     for pattern in (
         rf"%?(?:{_WORDS}|t)",
         rf"(?:(?:running|elapsed|relative|test|total|rel)[ ._-]*)?(?:{_WORDS}|t)(?:[ ._-]*{_UNIT})?",
-        rf"x[ _-]?value|x[ _-]?axis|seconds|sekunden|abtastzeit|messzeit|(?:{_WORDS})\s+\d.*",
+        rf"millis|micros|x[ _-]?value|x[ _-]?axis|seconds|sekunden|abtastzeit|messzeit|(?:{_WORDS})\s+\d.*",
         r"(?:date[ _/-]*time|time[ _-]*stamp|zeitstempel|datum[ _/-]*(?:zeit|uhrzeit)?|date)"
         rf"(?:[ ._-]*{_UNIT})?",
     )
 )
 _FREQUENCY = re.compile(r"(?:freq|frequency|frequenz|fr[ée]quence)(?:[ _]*hz)?|hz", re.IGNORECASE)
+_COUNTS = {"millis": "ms", "micros": "us"}  # functions of Arduino, and the units of what they give
 AGREES = 0.005  # relative difference of two statements of one rate that is worth no word
 
 
@@ -255,6 +256,7 @@ def _of_column(contents: Contents, source: str, column: Choice, units: Mapping[s
     if unit is None:
         match = next((m for p in _TIME_NAMES if (m := p.fullmatch(column.array.rpartition("/")[2].strip()))), None)
         unit = match.groupdict().get("unit") if match else None
+        unit = unit or _COUNTS.get(column.array.lower())
     factor = _seconds(unit) if unit else None
     instants = _instants(contents, source, column, factor)
     seconds, notes = mended(instants.seconds)

@@ -8,15 +8,17 @@ from jfsm.records.formats.base import StatedRate
 from jfsm.records.formats.numbers import number
 
 _RATE_KEYS = (
-    r"sampl\w*[ _-]?(?:rate|freq\w*)|(?:data|scan|acquisition)[ _-]?rate|fs|f_s|sps|abtast(?:rate|frequenz)"
-    r"|messrate|fr[ée]quence d'[ée]chantillonnage|rate|sampling"
+    r"sampl\w*[ _-]?(?:rate|freq\w*)|(?:data|scan|acquisition)[ _-]?rate|fs|f_s|sps|samples?\s*/\s*s\w*"
+    r"|abtast(?:rate|frequenz)|messrate|fr[ée]quence d'[ée]chantillonnage|rate|sampling"
 )
 _STEP_KEYS = (
     r"sampl\w*[ _-]?(?:interval|period|time|step)|delta[ _-]?[xt]|dt|d_t|ts|time[ _-]?(?:step|increment|interval)"
     r"|x[ _-]?(?:increment|interval)|increment|abtast(?:intervall|zeit)|interval"
 )
 _RATE_UNITS = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "s/s": 1.0, "sps": 1.0, "sa/s": 1.0, "ks/s": 1e3, "1/s": 1.0, "": 1.0}
-_RATE_UNITS |= dict.fromkeys(("samples/s", "samples/sec", "samples/second", "samples per second", "per second"), 1.0)
+_RATE_UNITS |= dict.fromkeys(
+    ("scans/s", "scans/sec", "samples/s", "samples/sec", "samples/second", "samples per second", "per second"), 1.0
+)
 _VALUE = r"""["']?\s*(?:[\[(](?P<before>[^\])]*)[\])])?\s*["']?\s*[:=;,\t ]\s*["']?\s*
              (?P<value>[-+]?\d[\d.,]*(?:[eE][-+]?\d+)?)\s*["']?[;,\t ]*\s*["']?
              [\[(]?(?P<after>[A-Za-zµ/]+(?:\ per\ second)?)?"""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from jfsm.records._units import is_unit
 from jfsm.records.formats.base import Contents, Lazy
 from jfsm.records.formats.headings import Headings, headings_of
 from jfsm.records.formats.numbers import is_number
@@ -16,6 +17,9 @@ from jfsm.records.formats.text.lines import Line, TextFile
 from jfsm.records.formats.text.table import Segment, Table
 
 MARK = "# jfsm record "  # opens the line on which a written record keeps what is no column
+_LISTED = re.compile(
+    r"^(?:units?(?: of)? )?(?P<name>.+?)(?:[ _]units?)?\s*[:=;\t]\s*[\[(]?(?P<unit>[^\s\])]+)[\])]?$", re.I
+)
 SHOWN = 3  # lines that a note quotes
 FEW = 2  # rows that a table at least has; fewer among more rows are a remark
 
@@ -56,6 +60,7 @@ class _Described:
         if not understood and segment is not first:
             headings, understood = self._headings(first, width)
         names = headings.names
+        units = {**self._listed_units(segment, headings, understood), **headings.units}
         about = next((_about(line) for _, line in segment.above if line.startswith(MARK)), {})
         rate = stated_rate(line for _, line in segment.above if not line.startswith(MARK))
         said = [*notes, *headings.notes, *self._unread(segment, headings, understood, rate and rate.words, width)]
@@ -72,7 +77,7 @@ class _Described:
 
         return Contents(
             Lazy(names, column),
-            headings.units,
+            units,
             about,
             notes=tuple(said),
             texts=Lazy(names, lambda name: table.texts(segment, names.index(name))),
@@ -90,11 +95,26 @@ class _Described:
             if is_comment(line) and not line.startswith(MARK)
         ]
         for lines in (plain, hidden):
-            headings = headings_of([self._divided(line, width) for _, line in lines], width)
+            above = [self._divided(line, width) for _, line in lines]
+            if segment.extra:  # the heading of a field that few rows have
+                above = [fields[:width] if len(fields) == width + 1 else fields for fields in above]
+            headings = headings_of(above, width)
             if headings.used:
                 return headings, {lines[place][0]: lines[place][1] for place in headings.used}
         self._require_unambiguous(plain or hidden, width)
         return headings_of([], width), {}
+
+    def _listed_units(self, segment: Segment, headings: Headings, understood: dict[int, str]) -> dict[str, str]:
+        """Units in lines of their own, as ``# force: kN``; the lines are then understood."""
+        found: dict[str, str] = {}
+        for number, line in segment.above:
+            match = _LISTED.match(line.strip().lstrip("#%/! "))
+            if match is None or not is_unit(match["unit"]):
+                continue
+            meant = (match["name"],) if match["name"] in headings.names else headings.aliases.get(match["name"], ())
+            if len(meant) == 1 and number not in understood:
+                found[meant[0]], understood[number] = match["unit"], line
+        return found
 
     def _divided(self, line: str, width: int) -> list[str]:
         """The fields of a heading; where blanks divide the rows, they may stand within a name, too."""
@@ -112,7 +132,11 @@ class _Described:
         if self._layout.delimiter != "," or not self._layout.integers or not above:
             return
         names = [field for field in fields_of(above[-1][1], ",") if field]
-        if 1 < len(names) < width <= 2 * len(names) and not any(map(is_number, names)):
+        if (
+            0 < len(names) < width <= 2 * len(names)
+            and (len(names) > 1 or width == 2)
+            and not any(map(is_number, names))
+        ):
             raise ValueError(
                 f"{self._path.name} has {len(names)} names ({', '.join(names)}) above rows of {width} fields; its "
                 f"commas may stand between fields and within numbers. Write it with semicolons between the fields, or "
