@@ -310,7 +310,7 @@ def test_a_missing_record_is_named(folder):
 
 def test_an_unknown_channel_is_named_beside_those_that_exist(folder):
     text = refusal("inspect", folder / "run.csv", "--displacement", "Y")
-    assert "`displacement` must name a channel of run.csv, which holds 't', 'u', 'y'; it was 'Y'" in text
+    assert "--displacement must name a channel of run.csv, which holds 't', 'u', 'y'; it was 'Y'" in text
 
 
 @pytest.mark.parametrize(
@@ -594,7 +594,7 @@ def test_a_demonstration_does_not_write_over_its_data(folder):
 
 def test_a_demonstration_names_the_channel_that_its_data_lack(folder, tmp_path):
     text = refusal("demo", "--data", folder / "run.csv", "--displacement", "x", "--report", tmp_path / "page.html")
-    assert "`displacement` must name a channel of run.csv" in text
+    assert "--displacement must name a channel of run.csv" in text
 
 
 def test_a_demonstration_ends_with_zero_and_says_where_its_page_is(tmp_path, monkeypatch):
