@@ -152,8 +152,11 @@ class Thresholds:
         for text in written:
             name, _, value = text.partition("=")
             if name not in known:
-                close = get_close_matches(name, known, 3) or known
-                raise ValueError(f"A threshold must be written as name=value; got {text!r}. Names: {', '.join(close)}.")
+                close = [f"Did you mean {near}? " for near in get_close_matches(name, known, 1)]
+                raise ValueError(
+                    f"A threshold must be written as name=value; got {text!r}. {''.join(close)}"
+                    f"Names: {', '.join(known)}."
+                )
             try:
                 values[name] = float(value)
             except ValueError:
