@@ -1,16 +1,21 @@
-"""Judges recorded evidence anew: which verdicts differ from those recorded, and on which number they turn.
+"""Judges recorded evidence anew: which verdicts differ from those before, and on which number they turn.
 
-    python benchmarks/replay.py DIR … [--sensitivity] [--checks] [--with NAME=VALUE …] [--without CHECK …]
+    python benchmarks/replay.py PATH … [--where TEXT] [--with NAME=VALUE …] [--without CHECK …]
+    python benchmarks/replay.py PATH … --record before.json; edit the code; the same with --against before.json
+    python benchmarks/replay.py PATH … --sensitivity --checks
 
-`DIR` holds cards of `benchmarks/blind.py --cards` and `benchmarks/cards.py`. With `--sensitivity` every threshold is
-moved by a fifth, down and up, and the verdicts that change are counted in a hundred: those that were right before and
-those that are right then; with `--checks` every check is left out by itself, as if all passed it. A card that lacks
-what another verdict asks is counted as not measured.
+A `PATH` is a folder of cards (of `benchmarks/blind.py --cards`, `benchmarks/cards.py`), a card, or what
+`jfsm diagnose --json` wrote, of which no truth is known. Verdicts are compared with those that were recorded; after
+`--record`, with those of the code before a change. With `--sensitivity` every threshold is moved by a fifth, down and
+up, and the verdicts that change are counted in a hundred: those that were right before and those that are right then;
+with `--checks` every check is left out by itself, as if all passed it. A card that lacks what another verdict asks is
+named as not measured, one that this version cannot read is named and left out.
 """
 
 import argparse
 import contextlib
 import dataclasses
+import itertools
 import json
 import sys
 import time
@@ -32,29 +37,83 @@ from jfsm.diagnosis.verdict.decision import Decision  # noqa: E402
 from jfsm.diagnosis.verdict.judge import judge  # noqa: E402
 
 MOVED = (0.8, 1.2)
+NOT_MEASURED = "not measured"
 SAME = 1e-12
 """Difference of a probability up to which it is the same."""
 
 
 class Card(NamedTuple):
-    """A recorded case."""
+    """A recorded case; `before` is the verdict that others are compared with, None where it was not measured."""
 
+    path: Path
     name: str
     truth: Mapping[str, Any]
     findings: Sequence[Mapping[str, Any]]
     evidence: Evidence
     decision: Decision
+    before: Decision | None
 
     @classmethod
     def of(cls, path: Path) -> "Card":
-        written = json.loads(path.read_text(encoding="utf-8"))
-        evidence, decision = Evidence.of_plain(written["evidence"]), Decision.of_plain(written["decision"])
-        return cls(written["name"], written["truth"], written["findings"], evidence, decision)
+        """A card, or a diagnosis, whose truth is not known.
+
+        Raises
+        ------
+        ValueError
+            If it is neither, or of another version.
+        """
+        try:
+            written = json.loads(path.read_text(encoding="utf-8"))
+            evidence, decision = Evidence.of_plain(written["evidence"]), Decision.of_plain(written["decision"])
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"{type(error).__name__}: {error}") from error
+        name, truth = written.get("name") or path.stem, written.get("truth") or {}
+        return cls(path, name, truth, written.get("findings") or (), evidence, decision, decision)
+
+    def fits(self, text: str) -> bool:
+        """Whether the name has this text in it, or it is `imposed` and the motion is."""
+        return text in self.name or (text == "imposed" and self.evidence.setting.imposed)
 
 
-def cards_in(folders: Iterable[Path]) -> list[Card]:
-    """The cards of all folders, by name."""
-    return [Card.of(path) for folder in folders for path in sorted(folder.glob("*.json"))]
+def files_in(path: Path) -> list[Path]:
+    """The cards of a folder, by name, or the one file.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
+    found = [path] if path.is_file() else sorted(path.glob("*.json"))
+    if not found:
+        raise ValueError(
+            f"{path} holds no cards (*.json); `benchmarks/blind.py --cards DIR` and `benchmarks/cards.py` record them"
+        )
+    return found
+
+
+def cards_in(paths: Iterable[Path]) -> tuple[list[Card], list[str]]:
+    """The cards of all folders and files, and in words those that cannot be read."""
+    cards, unread = [], []
+    for path in itertools.chain.from_iterable(map(files_in, paths)):
+        try:
+            cards.append(Card.of(path))
+        except ValueError as error:
+            unread.append(f"{path}: not read, it is of another version or no card ({error})")
+    return cards, unread
+
+
+def record(cards: Sequence[Card], limits: Thresholds, path: Path) -> None:
+    """Keep the verdicts of the code as it is."""
+    found = {str(card.path): judged(card, limits) for card in cards}
+    path.write_text(json.dumps({at: one and one.plain for at, one in found.items()}, allow_nan=False), encoding="utf-8")
+
+
+def against(cards: Sequence[Card], path: Path) -> tuple[list[Card], list[str]]:
+    """The cards with the verdicts that were kept, and in words those of which none was."""
+    kept = json.loads(path.read_text(encoding="utf-8"))
+    plain = {at: written and Decision.of_plain(written) for at, written in kept.items()}
+    known = [card._replace(before=plain[str(card.path)]) for card in cards if str(card.path) in plain]
+    return known, [f"{card.path}: not in {path}" for card in cards if str(card.path) not in plain]
 
 
 def judged(card: Card, limits: Thresholds) -> Decision | None:
@@ -86,9 +145,10 @@ def flips(cards: Sequence[Card], limits: Thresholds) -> tuple[list[str], Counter
     """Cards whose verdict is another one with these thresholds, in words, and how many of each kind."""
     lines, counts = [], Counter()
     for card in cards:
-        found, before = judged(card, limits), card.decision
-        if found is None:
-            counts["not measured"] += 1
+        found, before = judged(card, limits), card.before
+        if found is None or before is None:
+            counts[NOT_MEASURED] += 1
+            lines.append(f"{card.name}: {NOT_MEASURED}")
             continue
         if (found.verdict, found.winner) == (before.verdict, before.winner):
             counts["less sure" if not same(found, before) else "same"] += 1
@@ -122,14 +182,15 @@ def ablation(cards: Sequence[Card]) -> None:
             lines, counts = flips(cards, THRESHOLDS)
         print(f"{name:30s} {figures_of(counts, len(cards))}")
         for line in lines:
-            print(f"    {line}")
+            if not line.endswith(NOT_MEASURED):
+                print(f"    {line}")
 
 
 def figures_of(counts: Mapping[str, int], cards: int) -> str:
     """Verdicts that change, in a hundred and by kind."""
     lost, won, other = (counts.get(kind, 0) for kind in ("lost", "won", "changed"))
     share = 100 * (lost + won + other) / max(cards, 1)
-    return f"{share:9.1f} {lost:5d} {won:4d} {other:5d} {counts.get('not measured', 0):12d}"
+    return f"{share:9.1f} {lost:5d} {won:4d} {other:5d} {counts.get(NOT_MEASURED, 0):12d}"
 
 
 def sensitivity(cards: Sequence[Card]) -> None:
@@ -142,22 +203,55 @@ def sensitivity(cards: Sequence[Card]) -> None:
             print(f"{field.name:24s} {times:5.1f} {figures_of(counts, len(cards))}")
 
 
-def main() -> None:
+def arguments() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description="Judges recorded evidence anew.")
-    parser.add_argument("folders", nargs="+", type=Path, metavar="DIR")
+    parser.add_argument("paths", nargs="+", type=Path, metavar="PATH", help="folder of cards, a card, or a diagnosis")
+    parser.add_argument("--where", default="", metavar="TEXT", help="cards with this in their name, or `imposed`")
     parser.add_argument("--sensitivity", action="store_true", help="move each threshold by a fifth")
     parser.add_argument("--checks", action="store_true", help="leave out each check by itself")
     parser.add_argument("--without", nargs="+", default=[], choices=list(CHECKS), metavar="CHECK")
     parser.add_argument("--with", dest="moved", nargs="+", default=[], metavar="NAME=VALUE", help="other thresholds")
-    given = parser.parse_args()
-    begin, cards = time.perf_counter(), cards_in(given.folders)
-    moved = {name: float(value) for name, _, value in (each.partition("=") for each in given.moved)}
-    with without(given.without):
-        lines, counts = flips(cards, dataclasses.replace(THRESHOLDS, **moved))
+    parser.add_argument("--record", type=Path, metavar="FILE", help="keep the verdicts here, to compare later ones")
+    parser.add_argument("--against", type=Path, metavar="FILE", help="compare with what --record kept")
+    return parser
+
+
+def chosen(given: argparse.Namespace) -> list[Card]:
+    """The cards that are asked for; what is left out is said."""
+    cards, left_out = cards_in(given.paths)
+    cards = [card for card in cards if card.fits(given.where)]
+    if given.against is not None:
+        cards, unknown = against(cards, given.against)
+        left_out += unknown
+    for line in left_out:
+        print(line)
+    if left_out:
+        print(f"{len(left_out)} left out")
+    if not cards:
+        raise ValueError(f"no card is left to judge{f' with {given.where!r} in its name' if given.where else ''}")
+    return cards
+
+
+def compare(cards: Sequence[Card], limits: Thresholds) -> None:
+    """Verdicts that differ from those before."""
+    lines, counts = flips(cards, limits)
     for line in lines:
         print(line)
     known = [found for card in cards if (found := right(card, card.decision)) is not None]
     print(f"{len(cards)} cards, {sum(known)} of {len(known)} right as recorded; {dict(counts)}")
+
+
+def main() -> None:
+    parser = arguments()
+    given, begin = parser.parse_args(), time.perf_counter()
+    try:
+        limits, cards = THRESHOLDS.changed(given.moved), chosen(given)
+    except (OSError, ValueError) as error:
+        parser.error(str(error))
+    with without(given.without):
+        compare(cards, limits)
+        if given.record is not None:
+            record(cards, limits, given.record)
     if given.sensitivity:
         sensitivity(cards)
     if given.checks:

@@ -84,9 +84,17 @@ def test_a_sensor_has_classes_as_well():
 @pytest.mark.parametrize(
     ("probability", "kind_probability", "words"),
     [
-        (0.55, 0.98, "a hardening spring at 0-1 (98%); its law is open: a cubic hardening spring (55%), a pendulum's"),
-        (0.95, 0.98, "a cubic hardening spring at 0-1: grows."),
-        (0.45, 0.45, "a cubic hardening spring at 0-1: grows. By this record it may as well be a pendulum's spring."),
+        (
+            0.55,
+            0.98,
+            "a hardening spring at link ground–1 (98%); its law is open: a cubic hardening spring (55%), a pendulum's",
+        ),
+        (0.95, 0.98, "a cubic hardening spring at link ground–1: grows."),
+        (
+            0.45,
+            0.45,
+            "a cubic hardening spring at link ground–1: grows. By this record it may as well be a pendulum's spring.",
+        ),
     ],
 )
 def test_where_the_law_is_open_its_class_comes_first(probability: float, kind_probability: float, words: str):

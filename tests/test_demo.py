@@ -136,7 +136,7 @@ def test_the_demonstration_finds_the_friction_that_it_hid(seed, tmp_path):
     page = tmp_path / "page.html"
     run = CliRunner().invoke(app, ["demo", "--report", str(page), "--key", str(seed)])
     assert run.exit_code == 0, run.output
-    assert "lacks Coulomb friction at 0-1" in " ".join(run.stdout.split())
+    assert "lacks Coulomb friction at link ground–1" in " ".join(run.stdout.split())
     assert f"Coulomb friction of {FRICTION:g} N" in run.stdout
     assert page.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
 

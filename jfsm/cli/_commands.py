@@ -1,7 +1,7 @@
 """The commands."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -227,14 +227,30 @@ def why(
     cause: Annotated[
         str | None, typer.Argument(metavar="CAUSE", help="What became of this cause; the verdict without it.")
     ] = None,
+    changed: Annotated[
+        list[str] | None,
+        typer.Option("--with", metavar="NAME=VALUE", help="Judge again with this threshold; repeat for more."),
+    ] = None,
 ) -> None:
     """Show the checks that decided a verdict, or what became of one cause."""
     from ..reporting import print_why, read_diagnosis
 
+    d = read_diagnosis(numbers)
+    if changed:
+        d = _judged_again(d, changed)
     try:
-        print_why(read_diagnosis(numbers), cause)
+        print_why(d, cause)
     except LookupError as error:
         raise ValueError(str(error.args[0])) from None
+
+
+def _judged_again(d: dict[str, Any], changed: list[str]) -> dict[str, Any]:
+    """What was written, with the verdict that other thresholds give."""
+    from ..diagnosis import Thresholds, judge_again
+
+    decision = judge_again(d, Thresholds().changed(changed))
+    typer.echo(f"Judged again with {', '.join(changed)}; the file says {d['verdict']}.")
+    return {"verdict": decision.verdict, "decision": decision.plain}
 
 
 @command

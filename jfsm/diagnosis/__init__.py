@@ -7,5 +7,6 @@ from ._diagnosis import Finding as Finding
 from .advice.next_test import Proposal as Proposal
 from .evidence.evidence import Evidence as Evidence
 from .thresholds import Thresholds as Thresholds
+from .verdict.again import judge_again as judge_again
 from .verdict.decision import Decision as Decision
 from .verdict.judge import judge as judge

@@ -12,7 +12,7 @@ from .._result import Estimate
 from ..structures import Structure, causes
 from .advice.next_test import Leading, Proposal, proposals
 from .evidence.free_runs import Gain
-from .verdict.decision import Decision
+from .verdict.decision import Decision, Explanation
 
 
 @dataclass(frozen=True)
@@ -92,13 +92,6 @@ class CandidateResult:
     unfit: float | None = None
 
 
-class Explanation(str):
-    """Text that shows itself as it reads, in lines."""
-
-    def __repr__(self) -> str:
-        return str(self)
-
-
 @dataclass(frozen=True, repr=False)
 class Diagnosis:
     """What is wrong, why, how sure, and what mending it is worth; see the fields' own classes."""
@@ -154,24 +147,22 @@ class Diagnosis:
             return []
         return proposals(self.leading, jax.random.key(0) if key is None else key, progress)
 
-    def why(self, cause: str | None = None) -> "Explanation":
+    def why(self, cause: str | None = None) -> Explanation:
         """The checks that decided the verdict, or those of one cause, in words.
 
         Parameters
         ----------
         cause : str, optional
-            Id of a cause, also of one that lost early or was never fitted, or the key of a hypothesis (``given``,
-            ``refitted``, ``coulomb@0-1``).
+            Id or name of a cause, also of one that lost early or was never fitted, ``map``, or the key of a hypothesis
+            (``given``, ``refitted``, ``coulomb@0-1``).
 
         Raises
         ------
         ValueError
             If there is no such cause.
         """
-        from ..reporting import why_text
-
         try:
-            return Explanation(why_text(self.told, cause))
+            return self.decision.why(cause)
         except LookupError as error:
             if cause in causes():
                 return Explanation(f"{cause} was not looked for.\n")

@@ -3,7 +3,9 @@
 They are an argument of the judge (`verdict.judge`), so that recorded evidence can be judged anew with others.
 """
 
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterable
+from dataclasses import dataclass, field, fields, replace
+from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 _BLIND = "blind cases"
@@ -137,6 +139,29 @@ class Thresholds:
     worse: float = _number(
         1.5, "ratio", "Held-out error, in errors of the model as given and of noise, from which it is worse.", _BLIND
     )
+
+    def changed(self, written: Iterable[str]) -> "Thresholds":
+        """The same numbers but for those that are written as ``name=value``.
+
+        Raises
+        ------
+        ValueError
+            If a text is not of that form, or the name is not that of a threshold; the message has the names.
+        """
+        known, values = [f.name for f in fields(self)], {}
+        for text in written:
+            name, _, value = text.partition("=")
+            if name not in known:
+                close = [f"Did you mean {near}? " for near in get_close_matches(name, known, 1)]
+                raise ValueError(
+                    f"A threshold must be written as name=value; got {text!r}. {''.join(close)}"
+                    f"Names: {', '.join(known)}."
+                )
+            try:
+                values[name] = float(value)
+            except ValueError:
+                raise ValueError(f"The threshold `{name}` must be a number, as in {name}=0.5; got {text!r}.") from None
+        return replace(self, **values)
 
     def explained(self) -> dict[str, "Number"]:
         """Value, unit, meaning and source of every number, by name."""

@@ -1,5 +1,6 @@
 """What is shown: terminal text, pictures and pages, from plain dictionaries such as ``Diagnosis.to_json`` writes."""
 
+from ._checks import stopping_line as stopping_line
 from ._files import write_atomically as write_atomically
 from ._files import write_text_atomically as write_text_atomically
 from ._force_map_page import force_map_pictures as force_map_pictures
@@ -21,5 +22,6 @@ from ._text import inspection_text as inspection_text
 from ._text import print_diagnosis as print_diagnosis
 from ._text import print_inspection as print_inspection
 from ._why import print_why as print_why
-from ._why import stopping_line as stopping_line
 from ._why import why_text as why_text
+from ._wording import cause_name as cause_name
+from ._wording import place_name as place_name

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from jfsm.reporting._checks import checks_table, decisive_checks
 from jfsm.reporting._pictures import pictures
 from jfsm.reporting._quantities import number
 from jfsm.reporting._summary import key_answers
@@ -16,7 +17,7 @@ from jfsm.reporting._tables import (
     rivals_table,
 )
 from jfsm.reporting._template import inline, template
-from jfsm.reporting._why import checks_table, decisive_checks, probability_line, stopping_line
+from jfsm.reporting._why import why_lines
 from jfsm.reporting._wording import checked_verdict, extent
 
 FIRST_CANDIDATES = 10
@@ -65,9 +66,11 @@ def render_page(d: Mapping[str, Any]) -> str:
         gain=gain_table((d.get("gain") or {}).get("channels") or {}),
         first_candidates=candidates_table(candidates[:FIRST_CANDIDATES]),
         more_candidates=candidates_table(candidates[FIRST_CANDIDATES:]),
-        why=[*filter(None, (stopping_line(decision), probability_line(d, decision.get("winner", ""))))],
-        decisive=checks_table(decisive_checks(d), "Decisive checks"),
-        every_check=checks_table(decision.get("checks") or (), "Every check, in order"),
+        why=why_lines(d),
+        decisive=checks_table(decisive_checks(d), "Decisive checks", decision),
+        every_check=checks_table(
+            decision.get("checks") or (), "Every check, in the order in which they were made", decision
+        ),
         refitted=refitted_table(d.get("refitted") or {}),
         channels=channels_table(record.get("channels") or ()),
         detectable=detectable_table(d.get("detectable") or {}),

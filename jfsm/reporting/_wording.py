@@ -33,7 +33,7 @@ PROPER = {
     "smooth_coulomb": "smooth Coulomb friction",
     "stribeck": "Stribeck friction",
     "lugre": "LuGre friction",
-    "bouc_wen": "Bouc–Wen hysteresis",
+    "bouc_wen": "Bouc-Wen hysteresis",
     "jenkins": "Jenkins slider",
     "maxwell": "Maxwell element",
     "van_der_pol": "van der Pol damping",

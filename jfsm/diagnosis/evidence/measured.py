@@ -10,6 +10,7 @@ import numpy as np
 
 from ...structures import Clipping, Structure
 from ..hypotheses.effect import key_of
+from ..nats import many
 from ..search.batches import LeftBehind
 from ..search.rounds import Searched
 from ..thresholds import THRESHOLDS
@@ -169,7 +170,7 @@ def _why_behind(behind: LeftBehind) -> str:
     if math.isinf(behind.nats):
         return "not tried: the time was over"
     met = "not at its top when the time was over" if behind.cut else "not pursued"
-    return f"{met}: {behind.nats:.3g} nats behind the best where a misfit is still forgiven"
+    return f"{met}: {many(behind.nats)} nats behind the best where a misfit is still forgiven"
 
 
 def _why_left_out(share: float, *, cut: bool) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from ...reporting import cause_name, place_name
 from ...structures import Cause
 
 
@@ -15,7 +16,7 @@ class Effect(NamedTuple):
     @property
     def label(self) -> str:
         """Name and place in words."""
-        return f"{self.cause.label} at {'-'.join(map(str, self.at))}"
+        return f"{cause_name(self.cause.id)} at {place_name(self.at)}"
 
 
 def names(effects: Sequence[Effect]) -> str:

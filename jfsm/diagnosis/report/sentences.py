@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from ...reporting import stopping_line
+from ...reporting import place_name, stopping_line
 from ...structures import Cause, causes
 from .._diagnosis import Finding
 from ..advice.next_test import RIVAL
@@ -76,7 +76,7 @@ def difference_sentence(difference: Difference, unit: str) -> str:
 
 def finding_sentence(finding: Finding, known: Mapping[str, Cause]) -> str:
     """A finding in words; where its law is open, its class comes first, and then the laws that it may be."""
-    cause, where = known[finding.cause], "-".join(map(str, finding.at))
+    cause, where = known[finding.cause], place_name(finding.at)
     lacks = "The record shows" if cause.is_sensor else "The model lacks"
     if finding.law_open and finding.kind_probability - finding.probability > RIVAL:
         return f"{lacks} {finding.kind} at {where}{_how_much(finding)}; its law is open: {_laws(finding, known)}."

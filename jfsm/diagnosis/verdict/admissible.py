@@ -13,7 +13,8 @@ from ..evidence.scorecard import (
     EffectCard,
     Scorecard,
 )
-from .bench import Bench, shown
+from ..nats import gains
+from .bench import Bench
 
 _MAY_BE_ABSORBED = (FORCE_GAIN, ACCELERATION_GAIN, CONSTANT_FORCE, ACCELERATION_BIAS)
 """Roles of effects that own values and offsets may stand for."""
@@ -60,14 +61,15 @@ def _law_is_itself(card: Scorecard, bench: Bench) -> Reason:
 def _own_values_within_bounds(card: Scorecard, bench: Bench) -> Reason:
     far = sorted(set(card.at_bounds) - set(bench.refitted.at_bounds))
     says = f"takes {' and '.join(far)} as far from what the model states as they may be"
-    done = bench.check(
-        "own_values_within_bounds",
-        card.key,
-        len(far),
-        0,
-        says if far else "no own value ends at a bound where the refitted model's does not",
-    )
+    told = says if far else _no_farther_than_refit(card)
+    done = bench.check("own_values_within_bounds", card.key, len(far), 0, told)
     return "" if done.passed else says
+
+
+def _no_farther_than_refit(card: Scorecard) -> str:
+    if not card.at_bounds:
+        return "takes no own value to a bound"
+    return f"takes {' and '.join(sorted(card.at_bounds))} to a bound, as the refitted model does, too"
 
 
 # Worth it
@@ -82,7 +84,7 @@ def _better_than_refit(card: Scorecard, bench: Bench) -> Reason:
     unseen = not bench.shows(bench.refitted) and bool(card.laws) and not is_constant(card)
     limit = bench.limits.searched if unseen else bench.limits.significant
     baseline = "as given" if same else "refitted"
-    says = f"gains {shown(gain)} nats over the model {baseline}; more than {limit:.4g} are needed"
+    says = f"{gains(gain)} over the model {baseline}; more than {limit:.4g} are needed"
     done = bench.check("better_than_refit", card.key, gain, limit, says)
     if done.passed:
         return ""
@@ -156,7 +158,7 @@ def _is_enough(alone: Scorecard, pair: Scorecard, bench: Bench) -> Reason:
     unseen, prespecified = _separation(pair, alone, bench)
     least = bench.limits.significant if prespecified else bench.limits.searched
     nats = pair.evidence - alone.evidence
-    says = f"gains {shown(nats)} nats over {alone.label} alone; more than {least:.4g} are needed"
+    says = f"{gains(nats)} over {alone.label} alone; more than {least:.4g} are needed"
     probable = bench.check("second_effect_pays", pair.key, nats, least, says).passed
     if probable and (unseen or _predicts_better(alone, pair, bench)):
         return ""
@@ -190,7 +192,7 @@ def _no_bias_beside_it(card: Scorecard, bench: Bench) -> Reason:
     pairs = [pair for pair in bench.apart_from_the_drive if set(card.effects) < set(pair.effects)]
     for pair in (pair for pair in pairs if _adds_a_bias(pair, card, bench)):
         nats, most = pair.evidence - card.evidence, bench.limits.bias
-        says = f"with a bias of the accelerometer it gains {shown(nats)} nats; {most:.4g} at most may be an offset's"
+        says = f"with a bias of the accelerometer it {gains(nats)}; {most:.4g} at most may be an offset's"
         if not bench.check("no_bias_beside_it", card.key, nats, most, says).passed:
             return "holds only with an offset that is a bias"
     return ""

@@ -94,8 +94,3 @@ class Bench:
         """No alternative any more, for this reason."""
         self.reasons[key] = why
         self.factors.setdefault(key, []).append(Factor(why, 0.0))
-
-
-def shown(nats: float) -> str:
-    """A number of nats in words."""
-    return f"{nats:,.0f}" if abs(nats) >= 100 else f"{nats:.3g}"

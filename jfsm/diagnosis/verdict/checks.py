@@ -197,15 +197,18 @@ CHECKS: Mapping[str, Kind] = {
         "<",
         "correlation, log of a ratio, or share of the signal",
         "What it leaves does not correlate from sample to sample, is as large as the noise floor of the channels, and "
-        "shows in no prediction. The row has what is furthest from its limit.",
+        "shows in no prediction. The row has what is furthest from its limit. It chooses what is asked next, and is no "
+        "failure by itself.",
         ("white", "noise_scale", "negligible", "chance"),
     ),
     "map_adds_little": Kind(
         "sufficient",
         "<",
         "share of excess power",
-        "A map of the force that it leaves would not explain half of the rest.",
-        ("half",),
+        "A map of the force that it leaves would not explain half of the rest. Not asked of a cause that explains "
+        "almost all along an imposed motion and does not leave much, nor of one that explains nearly all where a model "
+        "error is admitted.",
+        ("half", "almost_all", "much", "nearly_all"),
     ),
     "explains_nearly_all": Kind(
         "sufficient",
@@ -242,7 +245,8 @@ CHECKS: Mapping[str, Kind] = {
         "confirmed",
         "<=",
         "ratio",
-        "Its held-out run is no worse than that of the model as given.",
+        "Its error on held-out readings is not larger by this ratio than that of the model as given, or than what "
+        "noise leaves, whichever is the larger.",
         ("worse",),
     ),
     "gains_something": Kind(

@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Sequence
 
+from ...reporting import place_name
 from ..evidence.scorecard import EffectCard, Scorecard
 from ..hypotheses.law_classes import NARROWEST_FIRST
 
@@ -39,7 +40,7 @@ def shares_a_class(card: Scorecard, winner: Scorecard) -> bool:
 
 def words(claim: Claim) -> str:
     """A claim in words."""
-    return " and ".join(f"{name} at {'-'.join(map(str, at))}" for at, name in claim)
+    return " and ".join(f"{name} at {place_name(at)}" for at, name in claim)
 
 
 def _share_a_class(one: EffectCard, other: EffectCard) -> bool:

@@ -23,8 +23,9 @@ def stays_in_step(evidence: Evidence, limits: Thresholds) -> Check | None:
     if errors is None:
         return None
     times = min(errors.before, errors.refitted) / max(errors.floor, limits.negligible)
+    what = "the force predicted" if evidence.setting.imposed else "a run"
     says = (
-        f"a run over all held-out readings is {times:.3g} times as wrong as noise makes it; {limits.worse:.3g} at most"
+        f"{what} over all held-out readings is {times:.3g} times as wrong as noise makes it; {limits.worse:.3g} at most"
     )
     return checked("stays_in_step", MODEL, times, limits.worse, says)
 
@@ -66,6 +67,7 @@ class _Hearing:
 
     def __init__(self, decision: Decision, evidence: Evidence, bench: Bench, errors: HeldOutErrors):
         self.decision, self.bench, self.errors = decision, bench, errors
+        self.imposed = evidence.setting.imposed
         self.winner = None if has_map(decision.winner) else evidence.cards[decision.winner]
         self.names = decision.verdict == "cause"
         self.leaves_something = self.names and self.winner is not None and not bench.noise_only(self.winner)
@@ -100,8 +102,10 @@ class _Hearing:
             return None
         most, errors = self.bench.limits.worse, self.errors
         times = errors.after / max(errors.before, errors.floor)
+        error = "its error of the predicted force" if self.imposed else "its error"
         says = (
-            f"its held-out run is {times:.3g} times as wrong as that of the model as given or noise; {most:.3g} at most"
+            f"{error} on held-out readings is {errors.after:.0%} of the signal; the model as given has "
+            f"{errors.before:.0%}, noise leaves {errors.floor:.0%}: {times:.3g} times the larger; {most:.3g} at most"
         )
         return self._refused(self._check("not_worse", times, most, says))
 
@@ -113,7 +117,8 @@ class _Hearing:
         return self._refused(self._check("gains_something", high, 0.0, says))
 
     def _refused(self, row: Check) -> Objection:
-        return None if row.passed else (row, "runs worse on held-out readings than the model as given")
+        how = "predicts" if self.imposed else "runs"
+        return None if row.passed else (row, f"{how} worse on held-out readings than the model as given")
 
     def _gains_where_unsure(self) -> Objection:
         if not self.leaves_something or self.decision.probability(self.decision.winner) >= self.bench.limits.named:

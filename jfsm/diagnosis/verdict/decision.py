@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
+from ...reporting import why_text
 from ..evidence.plain import as_plain
 from .checks import Check
 
@@ -28,6 +29,13 @@ def product_of(factors: Sequence[Factor]) -> float:
     return math.prod(factor.size for factor in factors) if factors else 0.0
 
 
+class Explanation(str):
+    """Text that shows itself as it reads, in lines."""
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
 @dataclass(frozen=True)
 class Decision:
     """A verdict, and how it was reached.
@@ -39,8 +47,7 @@ class Decision:
     winner : str
         Key of the hypothesis that it rests on.
     checks : tuple of Check
-        Every comparison in the order in which it was made. The last row of a verdict that is ``undecided`` by a check
-        is `stopped_by`.
+        Every comparison in the order in which it was made; `stopped_by` is among them, not always the last.
     factors : mapping
         Factors of the probability of every alternative, by key.
     explained : mapping
@@ -55,6 +62,8 @@ class Decision:
         Share of the elastic force that was admitted as model error to all hypotheses.
     finished : bool
         Whether the search behind it was finished.
+    since : int
+        Place in `checks` at which the judgement that stands begins: what comes before was judged anew.
     """
 
     verdict: str
@@ -67,6 +76,7 @@ class Decision:
     near: str | None = None
     model_error: float = 0.0
     finished: bool = True
+    since: int = 0
 
     def probability(self, key: str) -> float:
         """Probability of a hypothesis; 0 for one that is no alternative."""
@@ -83,11 +93,30 @@ class Decision:
         }
         return replace(self, factors=factors)
 
+    def after(self, earlier: Sequence[Check]) -> "Decision":
+        """The decision with the checks that were made before it."""
+        return replace(self, checks=(*earlier, *self.checks), since=len(earlier) + self.since)
+
     def refused(self, why: str, instead: str, by: Check) -> "Decision":
         """The decision without its winner, which a check speaks against."""
         factors = {**self.factors, self.winner: (*self.factors.get(self.winner, ()), Factor(why, 0.0))}
         reasons = {**self.reasons, self.winner: why}
         return replace(self, verdict="undecided", winner=instead, factors=factors, reasons=reasons, stopped_by=by)
+
+    def why(self, cause: str | None = None) -> Explanation:
+        """The checks that decided, or those of one cause, in words.
+
+        Parameters
+        ----------
+        cause : str, optional
+            Id or name of a cause, ``map``, or the key of a hypothesis (``given``, ``refitted``, ``coulomb@0-1``).
+
+        Raises
+        ------
+        LookupError
+            If no hypothesis has it; the message names those that come close.
+        """
+        return Explanation(why_text({"verdict": self.verdict, "decision": self.plain}, cause))
 
     @property
     def plain(self) -> dict[str, Any]:

@@ -38,7 +38,7 @@ def judge(evidence: Evidence, limits: Thresholds = THRESHOLDS) -> Decision:
     if row.passed:
         return replace(decision, checks=(*decision.checks, row))
     again = _concluded(evidence, limits, long_run=True)
-    return replace(again, checks=(*decision.checks, row, *again.checks))
+    return again.after((*decision.checks, row))
 
 
 def evidence_behind(decision: Decision, evidence: Evidence) -> Evidence:
@@ -71,7 +71,7 @@ def _with_model_error(decision: Decision, evidence: Evidence, limits: Thresholds
         return _cut_short(decision)
     again = _decided(other, limits, long_run)
     reasons = {**decision.reasons, **again.reasons}  # some are not compared once more
-    return replace(again, checks=(*decision.checks, *again.checks), reasons=reasons)
+    return replace(again, reasons=reasons).after(decision.checks)
 
 
 def _decided(evidence: Evidence, limits: Thresholds, long_run: bool) -> Decision:
@@ -85,12 +85,9 @@ def _decided(evidence: Evidence, limits: Thresholds, long_run: bool) -> Decision
         singles = [c for c in evidence.candidates if len(c.effects) == 1]
         alone = decided(Bench(evidence, limits, singles, long_run))
         if alone.verdict == "cause" and excess.almost_all(evidence.cards[alone.winner], evidence.refitted, limits):
-            decision = replace(
-                alone,
-                checks=(*decision.checks, *alone.checks),
-                explained={**decision.explained, **alone.explained},
-                reasons={**decision.reasons, **alone.reasons},
-            )
+            explained = {**decision.explained, **alone.explained}
+            reasons = {**decision.reasons, **alone.reasons}
+            decision = replace(alone, explained=explained, reasons=reasons).after(decision.checks)
     return _same_in_all_records(decision, evidence, limits)
 
 
@@ -138,7 +135,7 @@ def _beside_clipping(decision: Decision, clipped: Sequence[tuple[str, int]]) -> 
     )
     if not rows:
         return decision
-    decision = replace(decision, checks=(*rows, *decision.checks))
+    decision = decision.after(rows)
     if decision.verdict in ("consistent", "parameters"):
         return replace(decision, verdict="cause")
     guessed = any(kind == "force" for kind, _ in clipped)

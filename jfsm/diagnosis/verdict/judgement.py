@@ -3,8 +3,9 @@
 from ..evidence import excess
 from ..evidence.evidence import map_on
 from ..evidence.scorecard import GIVEN, REFITTED, Scorecard
+from ..nats import gains, many
 from .admissible import judge_candidates
-from .bench import Bench, shown
+from .bench import Bench
 from .checks import Check
 from .decision import MODEL, Decision
 from .ranking import is_sure_of, rank
@@ -116,7 +117,7 @@ class _Judgement:
     def _nothing_detected(self, winner: Scorecard, noise_only: bool) -> bool:
         bench, limits = self.bench, self.bench.limits
         gain, left = winner.evidence - bench.given.evidence, bench.left(bench.given)
-        says = f"{winner.label} gains {shown(gain)} nats over the model as given; {limits.significant:.4g} are needed"
+        says = f"{winner.label} {gains(gain)} over the model as given; {limits.significant:.4g} are needed"
         better = bench.check("better_than_given", MODEL, gain, limits.significant, says)
         least = limits.negligible
         says = f"predictions of the model as given leave {left:.2%} of the signal beyond noise; {least:.0%} is seen"
@@ -227,7 +228,7 @@ class _Judgement:
         if not bench.white(refitted):
             return "consistent"
         nats, most = bench.evidence.other_shapes(REFITTED).nats, 2 * bench.limits.other_shapes
-        says = f"forces of any shape would gain {shown(nats)} nats beside it; {most:.4g} at most may be noise"
+        says = f"forces of any shape would gain {many(nats)} nats beside it; {most:.4g} at most may be noise"
         row = bench.check("refit_leaves_no_shape", REFITTED, nats, most, says)
         if not row.passed:
             bench.stop(row)

@@ -7,9 +7,10 @@ import numpy as np
 
 from ..evidence import excess
 from ..evidence.scorecard import CONSTANT_FORCE, Scorecard
+from ..nats import many
 from ..thresholds import THRESHOLDS, Thresholds
 from .admissible import is_possible
-from .bench import Bench, shown
+from .bench import Bench
 from .claims import Claim, alike, claims_of, holds, shares_a_class, words
 
 TRACE = "is a trace: laws of other classes gain about as much, where the refitted model leaves nothing"
@@ -73,7 +74,8 @@ def is_sure_of(winner: Scorecard, bench: Bench) -> bool:
     likely = {claim: _probability_of(claim, bench) for claim in claims_of(winner)}
     if not bench.noise_only(winner):
         # The rest may be the work of another law than the catalogue's: no name is surer than what it explains.
-        bench.less_sure(list(bench.factors), "share of the excess that the leader explains", bench.explained(winner))
+        name = f"share of the excess that {winner.label} explains"
+        bench.less_sure(list(bench.factors), name, bench.explained(winner))
     probability, limits = bench.probability(winner.key), bench.limits
     says = f"has a probability of {probability:.0%}; {limits.named:.0%} are needed"
     named = bench.check("probability", winner.key, probability, limits.named, says)
@@ -121,7 +123,7 @@ def _special_case(winner: Scorecard, passing: Sequence[Scorecard], bench: Bench)
         return None
     nats = math.log(bench.probability(winner.key) / bench.probability(best.key))
     least = bench.limits.special_case
-    says = f"is {shown(nats)} nats likelier than its special case, {best.label}; at least {least:.3g} are needed"
+    says = f"is {many(nats)} nats likelier than its special case, {best.label}; at least {least:.3g} are needed"
     seen = bench.check("no_simpler_law_as_good", winner.key, nats, least, says)
     return None if seen.passed else best
 

@@ -1,12 +1,14 @@
 """Whether the law that would be named has the right shape, by what forces of other shapes would gain beside it."""
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from ..evidence.scorecard import CONSTANT_FORCE, Scorecard
-from .bench import Bench, shown
+from ..evidence.scorecard import CONSTANT_FORCE, OtherShapes, Scorecard
+from ..nats import shown
+from .bench import Bench
 from .checks import Check
 from .decision import SHAPE
 from .ranking import kin_of
@@ -29,13 +31,21 @@ def doubt(card: Scorecard, gained: float, bench: Bench, *, shapeless: bool = Fal
     much = (limits.other_shapes_of_white if white else share) * gained
     far = max(shapes.nats - least, 0.0) / max(much - least, least)
     limit = max(much, 2 * least)
-    says = f"forces of other shapes would gain {shown(shapes.nats)} nats beside it; {shown(limit)} at most may be left"
+    says = _says(shapes, limit, bench)
     rest = limits.rest_with_shape
     if white or shapeless or shapes.share / rest <= shapes.nats / limit:
         return far, bench.check("right_shape", card.key, shapes.nats, limit, says)
     says = f"forces of other shapes would explain {shapes.share:.0%} of what it leaves; {rest:.0%} at most may be left"
     row = bench.check("right_shape", card.key, shapes.share, rest, says, "share of the innovations' power")
     return max(far, shapes.share / rest), row
+
+
+def _says(shapes: OtherShapes, limit: float, bench: Bench) -> str:
+    if bench.evidence.setting.imposed:
+        return "its shape was not tested: no score test can be made along an imposed motion"
+    if math.isinf(shapes.strays):
+        return "its shape was not tested: its motion over what was fitted runs away"
+    return f"forces of other shapes would gain {shown(shapes.nats)} nats beside it; {shown(limit)} at most may be left"
 
 
 class Settled(NamedTuple):
