@@ -41,7 +41,7 @@ In JSON, `decision` holds
 | --- | --- |
 | `verdict` | as in the table below |
 | `winner` | key of the hypothesis that it rests on; of an undecided one `refitted` or `given`: nothing is named |
-| `near` | key of a law whose class is right though its shape is not, or beside which a map does better |
+| `near` | keys of laws whose class is right though their shape is not, or beside which a map does better |
 | `checks` | every comparison; those before place `since` were made, and judged anew |
 | `stopped_by` | where it is undecided, the check that stopped it, with what was measured and the limit |
 | `factors` | by key; their product is the probability of an alternative |

@@ -294,7 +294,7 @@ def test_a_law_of_the_wrong_shape_that_leaves_little_is_named_by_its_class_where
     how = {"shapes": 5000.0, "maps": None if mapped is None else {REFITTED: mapped}}
     decision = judged(found, **how)
     assert decision.verdict == ("undecided" if mapped is None else "unnamed")
-    assert decision.near == (found.key if near else None) and (decision.probability(found.key) > 0) == near
+    assert decision.near == ((found.key,) if near else ()) and (decision.probability(found.key) > 0) == near
     runs = {REFITTED: held(0.9), map_on(REFITTED): held(20.0), found.key: held(0.02, interval=(0.9, 1.0))}
     by_class = judged(found, held_out=runs, **how)  # the map runs worse, and that leaves the law
     assert by_class.verdict == ("cause" if near else "undecided")
@@ -308,7 +308,7 @@ def test_of_laws_alike_of_the_wrong_shape_the_one_is_near_whose_run_strays_least
     shapes = {t.key: OtherShapes(5000.0, strays=far) for t, far in zip(tried, strays, strict=True)}
     decision = judged(*tried, shapes=shapes, periods=50.0)
     found = [decision.probability(t.key) for t in tried]
-    assert decision.near == tried[named].key and found[named] == max(found) and 0.3 < sum(found) < 0.5
+    assert decision.near[0] == tried[named].key and found[named] == max(found) and 0.3 < sum(found) < 0.5
 
 
 @pytest.mark.parametrize(("model_error", "named"), [(0.0, "stiffness_drift@0-1"), (0.01, "coulomb@0-1")])
@@ -796,7 +796,7 @@ NOT_ONLY_NOISE = evidence_of(given(0.0, 0.0), refit(-5.0, 0.0), shapes=50.0)
 )  # fmt: skip
 def test_the_table_of_verdicts(verdict: str, winner: str, near: str | None, stopped_by: str | None, evidence: Evidence):
     decision = judge(evidence)
-    assert (decision.verdict, decision.winner, decision.near) == (verdict, winner, near)
+    assert (decision.verdict, decision.winner, decision.near) == (verdict, winner, (near,) if near else ())
     assert (decision.stopped_by and decision.stopped_by.name) == stopped_by
 
 

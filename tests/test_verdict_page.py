@@ -125,7 +125,7 @@ def test_a_check_that_chooses_the_path_is_no_failure_unless_it_stopped_the_verdi
     [
         ({}, "Most probable law: Coulomb friction at link ground–1 (25 %). Not named: explains 31 % of what the model "
          "leaves."),
-        ({"near": "jenkins@0-1"}, "Nearest law: Jenkins slider at link ground–1 (10 %). Not named: is like dry "
+        ({"near": ["jenkins@0-1"]}, "Nearest law: Jenkins slider at link ground–1 (10 %). Not named: is like dry "
          "friction; and a map would explain 98 %. As a class: closes −129 % of the error; 95 % are needed."),
         ({"factors": {"coulomb@0-1": [{"name": "share", "size": 0.6}, {"name": "refused", "size": 0.0}]}},
          "Most probable law: Coulomb friction at link ground–1 (60 % before it was refused). Not named: explains 31 %"),
@@ -153,7 +153,7 @@ def test_where_no_cause_is_named_the_nearest_law_is_and_all_that_it_failed_in_or
 
 
 def test_checks_of_a_judgement_that_was_reached_anew_do_not_decide():
-    decision = {**UNDECIDED["decision"], "since": 3, "stopped_by": None, "near": "coulomb@0-1"}
+    decision = {**UNDECIDED["decision"], "since": 3, "stopped_by": None, "near": ["coulomb@0-1"]}
     told = {of["says"] for of in decisive_checks({"verdict": "undecided", "decision": decision})}
     assert told == {"gains 900 nats over the model as given", STOPPED["says"]}
 

@@ -164,7 +164,7 @@ def nearest(d: Dictionary) -> str:
     if d["verdict"] not in OPEN:
         return ""
     if decision.get("near"):
-        return decision["near"]
+        return decision["near"][0]
     factors = {key: _unrefused(each) for key, each in (decision.get("factors") or {}).items() if "@" in key}
     explained = {key: float(each) for key, each in (decision.get("explained") or {}).items() if not key.endswith(MAP)}
     ranked = factors or {key: share for key, share in explained.items() if share > 0.0}

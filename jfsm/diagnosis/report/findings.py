@@ -97,7 +97,7 @@ def _finding(
         sentence=effect.cause.sentence,
         kind=kind,
         kind_probability=kind_probability,
-        law_open=probability < THRESHOLDS.class_named or ranked.decision.near == winner.key,
+        law_open=probability < THRESHOLDS.class_named or winner.key in ranked.decision.near,
         members=members,
         size=size_of_class(kind, likely, missing, nuisances.record.dt, units),
     )

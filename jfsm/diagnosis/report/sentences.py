@@ -103,7 +103,7 @@ def _named(decision: Decision, winner: Trial, findings: Sequence[Finding], shape
     """The causes that were named, and what remains unexplained or untried."""
     known = dict(causes()) | {e.cause.id: e.cause for e in winner.effects}
     words = " ".join(finding_sentence(f, known) for f in findings) + _remainder(winner, shape)
-    if decision.near == decision.winner:
+    if decision.winner in decision.near:
         words += " Its shape is not quite that of any law that was tried."
     if not decision.finished:
         words += " The search was not finished: what was not tried may explain it as well."

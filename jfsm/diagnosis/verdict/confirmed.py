@@ -13,6 +13,8 @@ from .checks import Check, checked
 from .decision import MODEL, Decision
 
 _NEAR = "is of the right class, though not quite of the right shape"
+MOST_NEAR = 3
+"""Laws that are near, at most, whose runs over held-out readings are made."""
 Objection = tuple[Check, str] | None
 """A check that a verdict does not pass, and why it is refused then."""
 
@@ -41,25 +43,26 @@ def confirm(decision: Decision, evidence: Evidence, limits: Thresholds, *, long_
         decision = decision.refused(against[1], REFITTED, against[0])
     elif hearing.closes_too_little():
         decision = decision.less_sure("runs over held-out readings close less than half")
-    open_yet = decision.near is not None and decision.verdict in ("undecided", "unnamed")
+    open_yet = decision.verdict in ("undecided", "unnamed")
     by_class = _of_its_class(decision, hearing) if open_yet else None
     return replace(by_class or decision, checks=(*decision.checks, *hearing.bench.log))
 
 
 def _of_its_class(decision: Decision, hearing: "_Hearing") -> Decision | None:
-    """The decision with the law that is near named, where runs over held-out readings confirm it."""
-    bench, near = hearing.bench, decision.near
-    errors = None if near is None else bench.evidence.held_out(near)
-    if near is None or errors is None:
-        return None
-    least = bench.limits.almost_all
-    says = (
-        f"closes {errors.closed:.0%} of the error on held-out readings; {least:.0%} are needed of a law not quite right"
-    )
-    row = bench.check("closes_nearly_all", near, errors.closed, least, says)
-    if not row.passed:
-        return None
-    return replace(decision, verdict="cause", winner=near, reasons={**decision.reasons, near: _NEAR}, stopped_by=None)
+    """The decision with the first of the laws that are near named that runs over held-out readings confirm."""
+    bench, least = hearing.bench, hearing.bench.limits.almost_all
+    for near in decision.near[:MOST_NEAR]:
+        errors = bench.evidence.held_out(near)
+        if errors is None:
+            return None
+        says = (
+            f"closes {errors.closed:.0%} of the error on held-out readings; {least:.0%} are needed of a law not quite "
+            "right"
+        )
+        if bench.check("closes_nearly_all", near, errors.closed, least, says).passed:
+            reasons = {**decision.reasons, near: _NEAR}
+            return replace(decision, verdict="cause", winner=near, reasons=reasons, stopped_by=None)
+    return None
 
 
 class _Hearing:

@@ -56,8 +56,8 @@ class Decision:
         Why a candidate was not named, by key; empty for one that was.
     stopped_by : Check, optional
         The check that left the verdict undecided.
-    near : str, optional
-        Key of a law that is of the right class though not of the right shape.
+    near : tuple of str
+        Keys of laws that are of the right class though not of the right shape, the likeliest first.
     model_error : float
         Share of the elastic force that was admitted as model error to all hypotheses.
     finished : bool
@@ -73,7 +73,7 @@ class Decision:
     explained: Mapping[str, float]
     reasons: Mapping[str, str]
     stopped_by: Check | None = None
-    near: str | None = None
+    near: tuple[str, ...] = ()
     model_error: float = 0.0
     finished: bool = True
     since: int = 0
@@ -137,6 +137,7 @@ class Decision:
                 k: tuple(Factor(f["name"], float(f["size"])) for f in v) for k, v in written["factors"].items()
             },
             "explained": {k: float(v) for k, v in written["explained"].items()},
+            "near": tuple(written["near"]),
             "stopped_by": None if stopped is None else check(stopped),
         }
         return cls(**{**written, **made})

@@ -19,7 +19,7 @@ from ..evidence.scorecard import GIVEN, REFITTED
 from ..thresholds import THRESHOLDS, Thresholds
 from .bench import Bench
 from .checks import checked
-from .confirmed import confirm, stays_in_step
+from .confirmed import MOST_NEAR, confirm, stays_in_step
 from .decision import MODEL, Decision
 from .judgement import decided
 from .right_shape import WRONG_SHAPE
@@ -96,8 +96,8 @@ def _may_be_one_of_two(decision: Decision, evidence: Evidence, limits: Threshold
     refused = [c for c in evidence.candidates if len(c.effects) > 1 and decision.reasons[c.key] == WRONG_SHAPE]
     if decision.verdict != "undecided" or not refused:
         return False
-    errors = None if decision.near is None else evidence.held_out(decision.near)
-    return errors is None or errors.closed < limits.almost_all
+    errors = (evidence.held_out(near) for near in decision.near[:MOST_NEAR])
+    return not any(one is not None and one.closed >= limits.almost_all for one in errors)
 
 
 def _same_in_all_records(decision: Decision, evidence: Evidence, limits: Thresholds) -> Decision:
@@ -117,7 +117,7 @@ def _cut_short(decision: Decision) -> Decision:
     says = "the search was not finished, and what was not tried may explain it as well"
     row = checked("finished", MODEL, 0, 1, says)
     instead = replace(
-        decision.less_sure("the search was not finished"), near=None, finished=False, checks=(*decision.checks, row)
+        decision.less_sure("the search was not finished"), near=(), finished=False, checks=(*decision.checks, row)
     )
     if decision.verdict == "cause":
         return instead

@@ -24,7 +24,7 @@ class _Judgement:
     """One pass through the stages over a bench."""
 
     def __init__(self, bench: Bench):
-        self.bench, self.near = bench, None
+        self.bench, self.near = bench, ()
 
     def decision(self) -> Decision:
         """Admissible, named, sufficient; then the table of verdicts."""
@@ -184,8 +184,7 @@ class _Judgement:
 
     def _by_shape(self, winner: Scorecard) -> tuple[str, Scorecard]:
         bench = self.bench
-        winner, failed, near = settle_shape(winner, bench)
-        self.near = None if near is None else near.key
+        winner, failed, self.near = settle_shape(winner, bench)
         if failed is None:
             return "cause", winner
         bench.stop(failed)
@@ -194,8 +193,7 @@ class _Judgement:
     def _name_its_class(self, winner: Scorecard) -> None:
         """Beside a map that does better, a class of laws that is sure."""
         if is_sure_of(winner, self.bench):
-            near = nearest(winner, self.bench)
-            self.near = None if near is None else near.key
+            self.near = nearest(winner, self.bench)
 
     def _map_stands_for_all(self) -> bool:
         mapped = self.bench.evidence.with_map(REFITTED)

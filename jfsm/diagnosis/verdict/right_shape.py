@@ -49,11 +49,11 @@ def _says(shapes: OtherShapes, limit: float, bench: Bench) -> str:
 
 
 class Settled(NamedTuple):
-    """The law that stands for its class, the check that it fails, if it does, and a law whose class is right."""
+    """The law that stands for its class, the check that it fails, if it does, and laws whose class is right, by key."""
 
     law: Scorecard
     failed: Check | None
-    near: Scorecard | None = None
+    near: tuple[str, ...] = ()
 
 
 def settle_shape(winner: Scorecard, bench: Bench) -> Settled:
@@ -69,7 +69,7 @@ def settle_shape(winner: Scorecard, bench: Bench) -> Settled:
         return Settled(found, None)
     near = nearest(found, bench)
     bench.reasons[found.key] = WRONG_SHAPE
-    if near is None:
+    if not near:
         bench.refuse(found.key, WRONG_SHAPE)
     return Settled(found, check, near)
 
@@ -111,24 +111,25 @@ def _alike(winner: Scorecard, bench: Bench) -> Sequence[Scorecard]:
     return [card for card in ranked if bench.probability(card.key) > least]
 
 
-def nearest(winner: Scorecard, bench: Bench) -> Scorecard | None:
-    """The law of the winner's class that is right in its class though not in its shape, or None.
+def nearest(winner: Scorecard, bench: Bench) -> tuple[str, ...]:
+    """Keys of the laws of the winner's class that are right in their class though not in their shape, the likeliest
+    first.
 
     Predictions over some periods hardly tell such laws apart; runs over all that was fitted do.
     """
     if bench.white(winner):
-        return None
+        return ()
     least = bench.limits.nearly_all if len(winner.effects) == 1 else bench.limits.almost_all
     kin = [card for card in (winner, *_alike(winner, bench)) if bench.explained(card) >= least]
     if not kin:
-        return None
+        return ()
     strays = np.array([max(bench.evidence.other_shapes(card.key).strays, 1e-9) for card in kin])
     before = np.array([bench.probability(card.key) for card in kin])
     weighed = before * (np.min(strays) / strays) ** bench.limits.fewest_looks
     after = weighed * np.sum(before) / np.sum(weighed)
     for card, factor in zip(kin, after / before, strict=True):
         bench.less_sure([card.key], "run over all that was fitted", float(factor))
-    return kin[int(np.argmax(weighed))]
+    return tuple(kin[i].key for i in np.argsort(-weighed, kind="stable"))
 
 
 def _not_identifiable(card: Scorecard, bench: Bench) -> Check | None:
