@@ -47,9 +47,10 @@ judge(Evidence.of_plain(written["evidence"]), Thresholds(named=0.9))  # with ano
 ## Table of verdicts
 """
 
-REMARK = """A channel that is cut off at a limit is a cause whatever else cannot be told. Where no cause is named, all
-hypotheses are compared once more with a share of the elastic force admitted as model error, if that makes the best of
-them likelier.
+REMARK = """A channel that is cut off at a limit is a cause whatever else cannot be told. So is a force that acts
+later than it was recorded, where nothing else is wrong and that changes a run of the model as given. Where no cause is
+named, all hypotheses are compared once more with a share of the elastic force admitted as model error, if that makes
+the best of them likelier.
 """
 
 TAIL = """## To change something

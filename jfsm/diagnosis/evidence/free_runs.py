@@ -71,7 +71,7 @@ class Gain(HeldOutErrors):
         return HeldOutErrors(self.before, self.refitted, self.after, self.floor, self.interval)
 
 
-def _window(samples: int, period: float) -> int:
+def window_of(samples: int, period: float) -> int:
     """Samples from which the start of a run of so many is estimated, which are not counted; a period has `period`."""
     return min(max(50, math.ceil(FILTERED * period)), samples // 3)
 
@@ -91,18 +91,20 @@ def measure_gain(
     noise: Mapping[tuple, float],
     fitted: Nuisances,
     key: jax.Array,
+    assumed: Reconstruction,
 ) -> tuple[Gain, list[dict]]:
     """Gain on what was held out, and per record the curves behind it (measured, before, after).
 
     `noise` is the standard deviation of each channel's noise; `fitted` tells how long a period is, whether anything
-    holds the structure in place, which zeros wander, and what the force does between its samples. Where nothing holds
-    it many short runs take the place of a long one.
+    holds the structure in place, which zeros wander, and when the force acts. The model as given runs as the force was
+    recorded, and goes between its samples as is `assumed`. Where nothing holds a structure in place many short runs
+    take the place of a long one.
     """
     rng = np.random.default_rng(np.asarray(jax.random.key_data(key)).astype(np.uint32).tolist())
     compared = []
     for part in held:
         models = {"before": given, "refitted": refitted(part.of), "after": extended(part.of)}
-        compared.append(_compared(part, models, noise, fitted, rng))
+        compared.append(_compared(part, models, noise, fitted, assumed, rng))
     channels = _channel_gains([each.squares for each in compared], held[0].record.units)
     total = {
         name: math.sqrt(float(np.mean([(getattr(c, name) / c.spread) ** 2 for c in channels.values()])))
@@ -131,6 +133,7 @@ def _compared(
     models: Mapping[str, Structure],
     noise: Mapping[tuple, float],
     fitted: Nuisances,
+    assumed: Reconstruction,
     rng: np.random.Generator,
 ) -> _Compared:
     """Runs of models over a held-out record, with their errors and those that noise alone leaves."""
@@ -139,11 +142,14 @@ def _compared(
     lead = _lead(models["after"], period)
     record, begin = (part.record[part.begin :], 0) if fitted.drifts else part.led_by(lead)
     record = _cleaned(record, wandering, noise, rng)
-    stretches = _stretches(record, period, drifts=fitted.drifts)
-    window = _window(min(s.stop - s.start for s in stretches), period)
+    stretches = stretches_of(record, period, drifts=fitted.drifts)
+    window = window_of(min(s.stop - s.start for s in stretches), period)
     counted = _counted(record, stretches, window, begin)
-    run_of = partial(_run, stretches=stretches, window=window, reconstruction=fitted.reconstruction)
-    runs = {name: run_of(model, record) for name, model in models.items()}
+    recorded, record = record, record.aligned(fitted.late) if fitted.late else record
+    by_pieces = partial(run_over, stretches=stretches, window=window)
+    run_of = partial(by_pieces, reconstruction=fitted.reconstruction)
+    runs = {"before": by_pieces(models["before"], recorded, reconstruction=assumed)}
+    runs |= {name: run_of(model, record) for name, model in models.items() if name != "before"}
     left = _noise(partial(run_of, models["after"]), record, counted, runs["after"], noise, fitted.memories, rng)
     off = {name: _off(run, record, counted, wandering) for name, run in runs.items()}
     squares = {name: {c: float(np.mean(error**2)) for c, error in errors.items()} for name, errors in off.items()}
@@ -189,7 +195,7 @@ def _cleaned(record: Record, wandering: Sequence[tuple], noise: Mapping[tuple, f
     return remeasured(record, shown, {}, rng)
 
 
-def _stretches(record: Record, period: float, *, drifts: bool) -> list[slice]:
+def stretches_of(record: Record, period: float, *, drifts: bool) -> list[slice]:
     """Stretches of a record that are run one by one: the whole, or where a structure `drifts` as long as predictions.
 
     In a longer one what nothing holds in place goes astray, however right the model.
@@ -227,7 +233,7 @@ def _interval(blocks: np.ndarray, floor: float, rng: np.random.Generator) -> tup
     return float(low), float(high)
 
 
-def _run(
+def run_over(
     model: Structure, record: Record, stretches: Sequence[slice], window: int, reconstruction: Reconstruction
 ) -> dict[tuple, np.ndarray]:
     """What a structure shows of a record, run over every stretch of it anew."""

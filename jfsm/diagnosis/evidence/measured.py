@@ -7,11 +7,14 @@ from functools import cached_property
 
 import jax
 
+from ...plant import Reconstruction
 from ...structures import Clipping, Structure
+from ..channels.clock import lateness
 from ..hypotheses.effect import key_of
 from ..search.batches import LeftBehind
 from ..search.rounds import Searched
 from ..verdict.decision import Decision
+from .as_recorded import change_by_times
 from .evidence import Evidence, Measure, SetAside, Setting, has_map, map_on
 from .fitted import Trial
 from .free_runs import Gain, measure_gain
@@ -28,13 +31,14 @@ from .split import HeldOut
 
 @dataclass(frozen=True)
 class HeldOutRuns:
-    """What was held out, the model as it was `stated` and with the clipping that its records show, and a source of
-    noise."""
+    """What was held out, the model as it was `stated` and with the clipping that its records show, a source of noise,
+    and how a force was `assumed` to go between its samples."""
 
     stated: Structure
     model: Structure
     held: Sequence[HeldOut]
     key: jax.Array
+    assumed: Reconstruction
 
 
 @dataclass
@@ -87,6 +91,8 @@ class Weighed:
             model_error=self.model_error,
             finished=not self.problem.limit.over,
             clipped=tuple(sensor.at for sensor in self.clipped),
+            late=tuple(lateness(self.found.refitted, self.problem)),
+            late_changes=change_by_times(self.held_out.stated, self.problem.first, self.held_out.assumed),
         )
 
     def _cards(self) -> Iterator[Scorecard]:
@@ -118,7 +124,9 @@ class Weighed:
             trial, refitted, first = self.trial(key), self.found.refitted, self.problem.first
             extended = (lambda record: runs.model) if key == GIVEN else trial.extended
             noise = noise_levels(trial, first)
-            self.runs[key] = measure_gain(runs.stated, refitted.extended, extended, runs.held, noise, first, runs.key)
+            self.runs[key] = measure_gain(
+                runs.stated, refitted.extended, extended, runs.held, noise, first, runs.key, runs.assumed
+            )
         return self.runs[key][0].errors
 
     def _with_model_error(self) -> Evidence | None:

@@ -12,6 +12,7 @@ from ...identification import prepare_all
 from ...plant import Reconstruction
 from ...records import Record
 from ...structures import Cause, Structure
+from ..channels.clock import WAYS, in_its_time
 from ..channels.drift import PLAINLY, steadied, wandering
 from ..evidence.between_records import differ
 from ..evidence.excess import white
@@ -42,7 +43,7 @@ class Study:
     model: Structure
     chosen: dict[str, Cause]
     places: Sequence[tuple[int, int]] | None
-    reconstruction: Reconstruction
+    reconstruction: Reconstruction | None
     key: jax.Array
     steps: Steps
     limit: Limit
@@ -82,7 +83,7 @@ class Study:
         part, every, ahead = self._sought(*believed(self._problem(parts)), known)
         if self.limit.over:
             return part, every, ahead
-        problem, given, refitted = believed(problem.knowing(part), near=ahead.refitted)
+        problem, given, refitted = believed(problem.as_timed(part).knowing(part), near=ahead.refitted)
         found = self._fitted_again(ahead, given, refitted, problem)
         if self.limit.over:
             return part, every, ahead
@@ -93,17 +94,22 @@ class Study:
     def _problem(self, training: Sequence[tuple[Record, int]]) -> Problem:
         """Records, and how much of each is fitted, as the likelihood sees them."""
         records, until = [whole for whole, _ in training], [fit for _, fit in training]
-        prepared = prepare_all(records, self.model, self.reconstruction)
-        return Problem(self.model, prepared, until, limit=self.limit)
+        ways = WAYS if self.reconstruction is None else (self.reconstruction,)
+        prepared = prepare_all(records, self.model, ways[0])
+        return Problem(self.model, prepared, until, limit=self.limit, ways=ways)
 
     def _sought(self, problem: Problem, given: Trial, refitted: Trial, known: Trial | None) -> Studied:
-        """What could be tried, and what was found; channels may turn out to drift, or their noise to be coloured.
+        """What could be tried, and what was found; the force may turn out to act late, channels to drift, or their
+        noise to be coloured.
 
         Where the time is over before that is known, what was found first is the answer.
         """
         self.limit.found()
         if self.limit.over:
             return problem, [], Searched(given, refitted, [], [], [], LackOfFit(problem))
+        other = in_its_time(refitted, problem, to_noise=True)
+        if other is not None:
+            return self._sought_with(other, problem, given, refitted, known)
         channel = wandering(refitted, problem, PLAINLY)
         if channel is not None:
             return self._sought_with(problem.with_wandering(channel), problem, given, refitted, known)
@@ -118,8 +124,8 @@ class Study:
     def _sought_with(
         self, other: Problem, problem: Problem, given: Trial, refitted: Trial, known: Trial | None
     ) -> Studied:
-        """What is found with another noise of the channels. What the model lacks may have looked like that: then it
-        holds as well without."""
+        """What is found with another noise of the channels, or the force at another time. What the model lacks may have
+        looked like that: then it holds as well without."""
         other, every, found = self._sought(*believed(other, near=refitted), known)
         best = max(found.every, key=lambda t: t.evidence)
         if best.effects and not self.limit.over:
