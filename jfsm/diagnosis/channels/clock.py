@@ -32,12 +32,11 @@ class _Way(NamedTuple):
 
 
 class _Timed(NamedTuple):
-    """A trial where the force acts at other times, and its evidence with what is not known of these."""
+    """A trial where the force acts at other times."""
 
     problem: Problem
     trial: Trial
     late: bool
-    evidence: float
 
 
 def in_its_time(beside: Trial, problem: Problem, *, to_noise: bool) -> Problem | None:
@@ -53,7 +52,7 @@ def in_its_time(beside: Trial, problem: Problem, *, to_noise: bool) -> Problem |
     if not most > THRESHOLDS.searched or problem.limit.over:
         return None
     best = _likeliest([_fitted(beside, problem, way) for way in ways if way.promise >= _WORTH_A_FIT * most])
-    gain = best.evidence - beside.evidence
+    gain = best.trial.evidence - beside.evidence
     if gain < THRESHOLDS.searched or gain < _by_a_late_channel(beside, problem):
         return None
     half = explained(best.trial, beside) >= THRESHOLDS.half and not to_noise
@@ -123,25 +122,25 @@ def _prior_of_delays(count: int) -> float:
 
 def _fitted(beside: Trial, problem: Problem, way: _Way) -> _Timed:
     """A trial fitted again where the force goes some way."""
-    other, theta, evidence = problem.timed(way.reconstruction, {}), beside.theta, None
+    other, theta = problem.timed(way.reconstruction, {}), beside.theta
     if way.late:
         free = _with_delays(beside, other)
         found = settle(other.posterior_of(free), free.theta, problem.limit)
-        theta, evidence = found.theta[0, : beside.theta.size], found.evidence(0)
+        theta = found.theta[0, : beside.theta.size]
         delays = found.theta[0, beside.theta.size :] * problem.first.record.dt
         channels = _forces(beside.structure, problem.first)
         other = problem.timed(way.reconstruction, dict(zip(channels, delays.tolist(), strict=True)))
     posterior = other.posterior_of(beside)
     found = settle(posterior, theta, problem.limit)
-    again = trial(posterior, found, 0, beside.rung, beside.label, beside.effects)
-    return _Timed(other, again, way.late, again.evidence if evidence is None else evidence)
+    return _Timed(other, trial(posterior, found, 0, beside.rung, beside.label, beside.effects), way.late)
 
 
 def _likeliest(found: list[_Timed]) -> _Timed:
     """The likeliest; the likeliest without a delay where one hardly makes it likelier."""
-    best = max(found, key=lambda one: one.evidence)
-    in_time = [one for one in found if not one.late and best.evidence - one.evidence < THRESHOLDS.significant]
-    return max(in_time, key=lambda one: one.evidence, default=best)
+    best = max(found, key=lambda one: one.trial.evidence)
+    least = best.trial.evidence - THRESHOLDS.significant
+    in_time = [one for one in found if not one.late and one.trial.evidence > least]
+    return max(in_time, key=lambda one: one.trial.evidence, default=best)
 
 
 def _by_a_late_channel(beside: Trial, problem: Problem) -> float:

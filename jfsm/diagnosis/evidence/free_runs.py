@@ -91,7 +91,7 @@ def measure_gain(
     noise: Mapping[tuple, float],
     fitted: Nuisances,
     key: jax.Array,
-    assumed: Reconstruction,
+    assumed: Reconstruction = "band-limited",
 ) -> tuple[Gain, list[dict]]:
     """Gain on what was held out, and per record the curves behind it (measured, before, after).
 
