@@ -16,8 +16,7 @@ from ._diagnosis import Diagnosis
 from .advice.detection_limits import Silence, Smallest, detectable, naturally_detectable
 from .advice.next_test import Leading
 from .channels.clipping import limited
-from .channels.clock import WAYS, lateness
-from .channels.delays import Late, in_time, showing_late, slightly_late
+from .channels.delays import Late, in_time, slightly_late
 from .channels.drift import steadied
 from .evidence.fitted import Trial
 from .evidence.measured import HeldOutRuns, Weighed
@@ -143,12 +142,13 @@ def _diagnosed(
     study = Study(model, chosen, places, reconstruction, key, steps, limit, pairs=max_causes > 1)
     problem, every, found, held, late = _looked_into(record, holdout, study)
     steps.next("the verdict, and its gain on held-out readings")
-    assumed = WAYS[0] if reconstruction is None else reconstruction
+    assumed = study.ways[0]
     weighed = Weighed(found, problem, clipped, HeldOutRuns(stated, model, held, key, assumed))
     decision = judge(weighed.evidence)
     behind = weighed.behind(decision)
     judged, tried, winner = behind.problem, behind.found, behind.trial(decision.winner)
-    extended, (gain, runs) = behind.extended(decision), behind.gain(decision)
+    late_forces, (gain, runs) = behind.late(decision), behind.gain(decision)
+    extended = behind.extended(decision, {**late, **{channel: tau[0] for channel, tau in late_forces.items()}})
     steps.next("the missing force")
     term = next(iter(winner.laws), None) if decision.verdict == "cause" else None
     first, fitted, refitted = judged.first, judged.until[0], tried.refitted
@@ -158,14 +158,11 @@ def _diagnosed(
     missing = residual(lacking, steadied(first), fitted, at)
     steps.next("what would have been seen")
     seen = _would_have_been_seen(decision.verdict, every, tried, judged)
-    if decision.verdict != "consistent":
-        late = {**late, **{channel: tau for channel, (tau, _, _) in lateness(winner, judged).items()}}
-        extended = showing_late(extended, late)
     unfinished = Unfinished.of(chosen, tried, limit, cut=not decision.finished, pairs=study.pairs)
     tested = Tested(tried.trials, tried.behind, tried.left_out, seen, tried.lack.known, unfinished)
     leading = Leading.of(model, [refitted, *tried.trials], lambda t: decision.probability(t.key), first, fitted)
     steps.end()
-    reached = Reached(decision, winner, term, weighed.evidence, assumed)
+    reached = Reached(decision, winner, term, weighed.evidence, assumed, late_forces)
     return assemble(reached, clipped, refitted, tested, judged, extended, missing, gain, runs, leading)
 
 

@@ -45,18 +45,21 @@ def in_its_time(beside: Trial, problem: Problem, *, to_noise: bool) -> Problem |
     It has to explain half of what the trial leaves, or leave noise alone, as it must with `to_noise`: what a model
     lacks may look like a late force.
     """
-    if not problem.ways or not _forces(beside.structure, problem.first):
+    ways = _worth_a_fit(beside, problem)
+    if not ways or problem.limit.over:
         return None
-    ways = [way for name in problem.ways for way in _promises(beside, problem, name)]
-    most = max(way.promise for way in ways)
-    if not most > THRESHOLDS.searched or problem.limit.over:
-        return None
-    best = _likeliest([_fitted(beside, problem, way) for way in ways if way.promise >= _WORTH_A_FIT * most])
-    gain = best.trial.evidence - beside.evidence
-    if gain < THRESHOLDS.searched or gain < _by_a_late_channel(beside, problem):
-        return None
-    half = explained(best.trial, beside) >= THRESHOLDS.half and not to_noise
-    return best.problem if half or is_noise_only(best.trial) else None
+    best = _likeliest([_fitted(beside, problem, way) for way in ways])
+    least = max(THRESHOLDS.searched, _by_a_late_channel(beside, problem))
+    likelier = best.trial.evidence - beside.evidence >= least
+    enough = is_noise_only(best.trial) or (not to_noise and explained(best.trial, beside) >= THRESHOLDS.half)
+    return best.problem if likelier and enough else None
+
+
+def late_channels(structure: Structure, problem: Problem) -> list[Channel]:
+    """The channels of the force that are late in a problem that knows when it acts: all, or none."""
+    first = problem.first
+    held = first.reconstruction == "hold" and not problem.ways  # else it was stated
+    return _forces(structure, first) if first.late or held else []
 
 
 def lateness(t: Trial, problem: Problem) -> dict[Channel, tuple[float, float, float]]:
@@ -65,18 +68,24 @@ def lateness(t: Trial, problem: Problem) -> dict[Channel, tuple[float, float, fl
     One that is held between its samples is late by half of one; what goes straight is in time.
     """
     first, dt = problem.first, problem.first.record.dt
-    if first.reconstruction == "hold" and not problem.ways and not first.late:
-        return {channel: (-dt / 2, -dt / 2, -dt / 2) for channel in _forces(t.structure, first)}
+    channels, by_holding = late_channels(t.structure, problem), -dt / 2 if first.reconstruction == "hold" else 0.0
     if not first.late:
-        return {}
-    free = _with_delays(t, problem)
+        return {channel: (by_holding, by_holding, by_holding) for channel in channels}
+    free, found = _with_delays(t, problem), dict[Channel, tuple[float, float, float]]()
     covariance = np.linalg.pinv(problem.posterior_of(free).evaluate(free.theta[None])[2][0], hermitian=True)
-    held = -dt / 2 if first.reconstruction == "hold" else 0.0
-    found = dict[Channel, tuple[float, float, float]]()
-    for k, channel in enumerate(_forces(t.structure, first), start=t.theta.size):
-        tau, far = first.late.get(channel, 0.0) + held, 1.96 * dt * float(np.sqrt(max(covariance[k, k], 0.0)))
+    for k, channel in enumerate(channels, start=t.theta.size):
+        tau, far = first.late.get(channel, 0.0) + by_holding, 1.96 * dt * float(np.sqrt(max(covariance[k, k], 0.0)))
         found[channel] = tau, tau - far, tau + far
     return found
+
+
+def _worth_a_fit(beside: Trial, problem: Problem) -> list[_Way]:
+    """The ways that promise most beside a trial, where they promise enough."""
+    if not problem.ways or not _forces(beside.structure, problem.first):
+        return []
+    ways = [way for name in problem.ways for way in _promises(beside, problem, name)]
+    least = max(THRESHOLDS.searched, _WORTH_A_FIT * max(way.promise for way in ways))
+    return [way for way in ways if way.promise >= least]
 
 
 def _forces(structure: Structure, nuisances: Nuisances) -> list[Channel]:

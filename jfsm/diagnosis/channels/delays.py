@@ -32,13 +32,17 @@ def slightly_late(trials: Sequence[Trial], known: Late, record: Record) -> Late:
     """
     best = max(trials, key=lambda t: t.evidence)
     delays = [part for part in best.parts if isinstance(part, _DELAYS)]
-    told = any(isinstance(part, ForceDelay) for part in delays) or (
-        len(record.responses) == 1 and len(record.channels) > 1
-    )
-    slight = not told and all(abs(part.tau) < record.dt for part in delays)
-    if not (delays and slight and best.evidence > _in_time_evidence(best, trials) + THRESHOLDS.significant):
+    if not delays or not all(_is_slight(part, record) for part in delays):
+        return known
+    if best.evidence <= _in_time_evidence(best, trials) + THRESHOLDS.significant:
         return known
     return {**known, **{part.at: known.get(part.at, 0.0) + float(part.tau) for part in delays}}
+
+
+def _is_slight(part: ForceDelay | ChannelDelay, record: Record) -> bool:
+    """Whether a response channel is late by less than a sample, and others tell the time."""
+    tells = len(record.responses) > 1 or len(record.channels) == 1
+    return tells and isinstance(part, ChannelDelay) and abs(part.value) < record.dt
 
 
 def _in_time_evidence(best: Trial, trials: Sequence[Trial]) -> float:

@@ -145,11 +145,10 @@ def _compared(
     stretches = stretches_of(record, period, drifts=fitted.drifts)
     window = window_of(min(s.stop - s.start for s in stretches), period)
     counted = _counted(record, stretches, window, begin)
-    recorded, record = record, record.aligned(fitted.late) if fitted.late else record
     by_pieces = partial(run_over, stretches=stretches, window=window)
-    run_of = partial(by_pieces, reconstruction=fitted.reconstruction)
-    runs = {"before": by_pieces(models["before"], recorded, reconstruction=assumed)}
-    runs |= {name: run_of(model, record) for name, model in models.items() if name != "before"}
+    before = by_pieces(models["before"], record, reconstruction=assumed)
+    record, run_of = record.aligned(fitted.late), partial(by_pieces, reconstruction=fitted.reconstruction)
+    runs = {"before": before} | {name: run_of(models[name], record) for name in ("refitted", "after")}
     left = _noise(partial(run_of, models["after"]), record, counted, runs["after"], noise, fitted.memories, rng)
     off = {name: _off(run, record, counted, wandering) for name, run in runs.items()}
     squares = {name: {c: float(np.mean(error**2)) for c, error in errors.items()} for name, errors in off.items()}

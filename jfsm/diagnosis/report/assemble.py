@@ -1,10 +1,10 @@
 """A diagnosis, assembled from a decision and what was measured for it."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
-from ...plant import Reconstruction
-from ...structures import AbstractTerm, Clipping, Structure, causes
+from ...plant import Channel, Reconstruction
+from ...structures import AbstractTerm, Clipping, Structure
 from .._diagnosis import CandidateResult, Diagnosis
 from ..advice.detection_limits import Smallest
 from ..advice.next_test import Leading
@@ -25,9 +25,9 @@ from ..verdict.decision import Decision
 from .estimates import Units, noise_by_channel, refitted_values, smallest_effects, unit_of
 from .findings import findings_of, fitted_candidate, unfitted_candidate
 from .force_shape import shape_of
-from .late_forces import late_forces, times_of_forces
+from .late_forces import beside_late_forces, late_forces, times_of_forces
 from .plain_data import Drawn, jfsm_version, plain_gain, plain_record
-from .sentences import difference_sentence, finding_sentence, verdict_advice, verdict_sentence
+from .sentences import difference_sentence, verdict_advice, verdict_sentence
 from .unfinished import Unfinished
 
 
@@ -47,14 +47,15 @@ class Tested(NamedTuple):
 
 
 class Reached(NamedTuple):
-    """The decision, the trial that it rests on, the law that was named, if one was, all the evidence, and how a force
-    was assumed to go between its samples."""
+    """The decision, the trial that it rests on, the law that was named, if one was, all the evidence, how a force was
+    assumed to go between its samples, and how late forces are, by channel, with the 95 % interval [s]."""
 
     decision: Decision
     winner: Trial
     term: AbstractTerm | None
     evidence: Evidence
     assumed: Reconstruction
+    late: Mapping[Channel, tuple[float, float, float]]
 
 
 def assemble(
@@ -73,22 +74,20 @@ def assemble(
     decision, unfinished, model, records = reached.decision, tested.unfinished, problem.model, problem.records
     first, verdict = records[0], decision.verdict
     units, imposed = first.record.units, first.path is not None
-    findings = findings_of(decision, reached.winner, tested.trials, clipped, model, first)
-    late = late_forces(reached.winner, problem, reached.evidence.setting)
-    findings += late
+    late = late_forces(reached.late, first, reached.evidence.setting)
+    findings = (*findings_of(decision, reached.winner, tested.trials, clipped, model, first), *late)
     candidates = tuple(_candidates(tested, decision, refitted, model, units))
     winner = reached.winner if decision.winner != GIVEN else refitted
     refit = refitted_values(winner, model, units)
     between = [] if verdict == "consistent" else differences(winner)
     differ = [difference_sentence(one, unit_of(winner.structure, one.path, units)) for one in between]
-    said = times_of_forces(reached.winner, problem, reached.assumed)
+    said = times_of_forces(reached.late, first, reached.assumed)
     notes = tuple(dict.fromkeys([*_notes(unfinished, problem, differ, winner), *said]))
     smallest = smallest_effects(tested.seen, units)
     shape = shape_of(missing) if verdict in ("undecided", "unnamed") else None
     drawn = Drawn(missing, runs, reached.term, first.record, first.period, with_shape=verdict != "consistent")
     sentence = verdict_sentence(decision, reached.winner, findings, gain, shape, differ, imposed=imposed)
-    if verdict in ("undecided", "unnamed"):
-        sentence = " ".join([sentence, *(finding_sentence(one, causes()) for one in late)])
+    sentence = beside_late_forces(sentence, verdict, late)
     advice = verdict_advice(decision, gain, imposed=imposed)
     told = {
         "jfsm": jfsm_version(),

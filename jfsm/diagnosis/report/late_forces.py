@@ -1,52 +1,58 @@
 """Forces that act later than they were recorded, in words."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
+from ...identification import Nuisances
+from ...plant import Channel, Reconstruction
 from ...structures import causes
 from .._diagnosis import Estimate, Finding, Rival
-from ..channels.clock import lateness
 from ..evidence.evidence import Setting
-from ..evidence.fitted import Trial
-from ..evidence.setup import Problem
 from ..thresholds import THRESHOLDS
 from .law_class import class_of
+from .sentences import finding_sentence
+
+Lateness = Mapping[Channel, tuple[float, float, float]]
+"""How late forces are, by channel, with the 95 % interval [s]; negative where they act later than was recorded."""
 
 PROBABILITY = 0.99
 """That a force is late that was found so: its evidence is beyond doubt, and a law that looks like it was tried."""
 
 
-def late_forces(beside: Trial, problem: Problem, setting: Setting) -> tuple[Finding, ...]:
+def late_forces(late: Lateness, first: Nuisances, setting: Setting) -> tuple[Finding, ...]:
     """The forces that are late, as findings, where that changes a run of the model as given by more than is negligible.
 
     Where one response alone was measured, it may be that one which is late.
     """
     if setting.late_changes <= THRESHOLDS.negligible:
         return ()
-    known, record, found = causes(), problem.first.record, list[Finding]()
-    for at, tau in lateness(beside, problem).items():
-        cause, sensor = known["force_delay"], known["force_delay"].term(at, tau=tau[0])
+    cause, responses = causes()["force_delay"], list(first.record.responses)
+    rivals = tuple(Rival("channel_delay", at, 1 - PROBABILITY) for at in responses if len(responses) == 1)
+
+    def finding(at: Channel, tau: tuple[float, float, float]) -> Finding:
+        kind, sentence = class_of(cause, cause.term(at, tau=tau[0])), _when(tau[0], first)
         values = {"tau": Estimate(*tau, "s")}
-        rivals = [Rival("channel_delay", c, 1 - PROBABILITY) for c in record.responses if len(record.responses) == 1]
-        kind = class_of(cause, sensor)
-        sentence = _when(tau[0], record.dt, held=problem.first.reconstruction == "hold")
-        found.append(
-            Finding(cause.id, cause.family, at, PROBABILITY, values, tuple(rivals), sentence, kind, PROBABILITY)
-        )
-    return tuple(found)
+        return Finding(cause.id, cause.family, at, PROBABILITY, values, rivals, sentence, kind, PROBABILITY)
+
+    return tuple(finding(at, tau) for at, tau in late.items())
 
 
-def times_of_forces(beside: Trial, problem: Problem, assumed: str) -> Iterator[str]:
+def beside_late_forces(sentence: str, verdict: str, found: Sequence[Finding]) -> str:
+    """The sentence of a verdict that names no finding, with these."""
+    named = [] if verdict in ("cause", "parameters") else [finding_sentence(one, causes()) for one in found]
+    return " ".join([sentence, *named])
+
+
+def times_of_forces(late: Lateness, first: Nuisances, assumed: Reconstruction) -> Iterator[str]:
     """What is to be said of when forces act, where it is otherwise than was recorded and `assumed`."""
-    first = problem.first
     if first.reconstruction == "linear" and assumed != "linear":
         yield "The force goes straight from sample to sample; all runs but that of the model as given take it so."
-    for (kind, j), (tau, _, _) in lateness(beside, problem).items():
-        when = _when(tau, first.record.dt, held=first.reconstruction == "hold")
-        yield f"{kind} {j}: {when}; all runs but that of the model as given take it so."
+    for (kind, j), (tau, _, _) in late.items():
+        yield f"{kind} {j}: {_when(tau, first)}; all runs but that of the model as given take it so."
 
 
-def _when(tau: float, dt: float, *, held: bool) -> str:
-    """When a force acts that is read so much later than it is [s]."""
+def _when(tau: float, first: Nuisances) -> str:
+    """When a force acts that is so late [s]."""
+    dt, held = first.record.dt, first.reconstruction == "hold"
     much, late = f"{abs(tau):.3g} s ({abs(tau) / dt:.2g} samples)", "later" if tau < 0 else "earlier"
     acts = f"it acts {much} {late} than it was recorded"
     return f"the force is held between its samples: {acts}" if held else acts.replace("it", "the force", 1)

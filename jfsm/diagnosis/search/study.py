@@ -49,6 +49,11 @@ class Study:
     limit: Limit
     pairs: bool
 
+    @property
+    def ways(self) -> tuple[Reconstruction, ...]:
+        """Those in which a force may go between its samples, what is assumed first."""
+        return WAYS if self.reconstruction is None else (self.reconstruction,)
+
     def of(
         self, training: Sequence[tuple[Record, int]], *, unless_later: bool = False, known: Trial | None = None
     ) -> Studied | Trial:
@@ -94,9 +99,8 @@ class Study:
     def _problem(self, training: Sequence[tuple[Record, int]]) -> Problem:
         """Records, and how much of each is fitted, as the likelihood sees them."""
         records, until = [whole for whole, _ in training], [fit for _, fit in training]
-        ways = WAYS if self.reconstruction is None else (self.reconstruction,)
-        prepared = prepare_all(records, self.model, ways[0])
-        return Problem(self.model, prepared, until, limit=self.limit, ways=ways)
+        prepared = prepare_all(records, self.model, self.ways[0])
+        return Problem(self.model, prepared, until, limit=self.limit, ways=self.ways)
 
     def _sought(self, problem: Problem, given: Trial, refitted: Trial, known: Trial | None) -> Studied:
         """What could be tried, and what was found; the force may turn out to act late, channels to drift, or their
