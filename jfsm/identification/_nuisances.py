@@ -239,9 +239,14 @@ class Nuisances:
             colour=colour,
         )
 
+    def in_time(self, record: Record) -> Record:
+        """Another record with the channels of the force put in time that were late in this one."""
+        return record.aligned({channel: tau for channel, tau in self.late.items() if channel in record.channels})
+
     def timed(self, reconstruction: Reconstruction, late: Mapping[Channel, float]) -> "Nuisances":
         """The same record, its force so between its samples, and channels of it put in time that are so late [s]."""
         assert isinstance(self.inputs, InterpolatedInput)
+        late = {channel: tau for channel, tau in late.items() if channel in self.record.channels}
         record, inputs, dt = self.record.aligned(late), self.inputs, self.record.dt
         force, base = (np.array(drive)[: self.samples, 0] for drive in (inputs.force, inputs.base))
         for (_, j), tau in late.items():

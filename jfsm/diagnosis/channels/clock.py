@@ -1,6 +1,6 @@
 """When a force acts: how it goes between its samples, and how much later than it was recorded."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple, get_args
 
@@ -17,6 +17,8 @@ from .delays import likeliest_delay
 
 WAYS: tuple[Reconstruction, ...] = get_args(Reconstruction)
 """Of a force between its samples; what is filtered before it is sampled goes the first one."""
+Lateness = Mapping[Channel, tuple[float, float, float]]
+"""How late forces are, by channel, with the 95 % interval [s]; negative where they act later than was recorded."""
 _USUAL, _FARTHEST = 0.5, 1.0
 """Samples by which a force is late as a rule, and at most: one that is later is a candidate like any other."""
 _WORTH_A_FIT = 0.8
@@ -42,33 +44,35 @@ class _Timed(NamedTuple):
 def in_its_time(beside: Trial, problem: Problem, *, to_noise: bool) -> Problem | None:
     """The problem in which the force acts otherwise, where that is far likelier beside a trial; None elsewhere.
 
-    It has to explain half of what the trial leaves, or leave noise alone, as it must with `to_noise`: what a model
-    lacks may look like a late force.
+    It has to explain nearly all of what the trial leaves, or leave noise alone, as it must with `to_noise`: what a
+    model lacks may look like a late force, and so may one late response of two.
     """
     ways = _worth_a_fit(beside, problem)
-    if not ways or problem.limit.over:
+    found = [] if problem.limit.over else [one for way in ways for one in _fitted(beside, problem, way)]
+    if not found:
         return None
-    best = _likeliest([_fitted(beside, problem, way) for way in ways])
+    best = _likeliest(found)
     least = max(THRESHOLDS.searched, _by_a_late_channel(beside, problem))
     likelier = best.trial.evidence - beside.evidence >= least
-    enough = is_noise_only(best.trial) or (not to_noise and explained(best.trial, beside) >= THRESHOLDS.half)
+    enough = is_noise_only(best.trial) or (not to_noise and explained(best.trial, beside) >= THRESHOLDS.nearly_all)
     return best.problem if likelier and enough else None
 
 
-def late_channels(structure: Structure, problem: Problem) -> list[Channel]:
-    """The channels of the force that are late in a problem that knows when it acts: all, or none."""
+def late_channels(structure: Structure, problem: Problem, assumed: Reconstruction) -> list[Channel]:
+    """The channels of the force that are late in a problem that knows when it acts: all, or none. One that is held is,
+    unless that was `assumed`."""
     first = problem.first
-    held = first.reconstruction == "hold" and not problem.ways  # else it was stated
-    return _forces(structure, first) if first.late or held else []
+    return _forces(structure, first) if first.late or first.reconstruction == "hold" != assumed else []
 
 
-def lateness(t: Trial, problem: Problem) -> dict[Channel, tuple[float, float, float]]:
-    """How late the force is in a problem that knows it, by channel, with the 95 % interval beside a trial [s].
+def lateness(t: Trial, problem: Problem, assumed: Reconstruction = WAYS[0]) -> Lateness:
+    """How late the force is in a problem that knows it, beside a trial.
 
     One that is held between its samples is late by half of one; what goes straight is in time.
     """
     first, dt = problem.first, problem.first.record.dt
-    channels, by_holding = late_channels(t.structure, problem), -dt / 2 if first.reconstruction == "hold" else 0.0
+    channels = late_channels(t.structure, problem, assumed)
+    by_holding = dt * (_by_holding(first.reconstruction) - _by_holding(assumed))
     if not first.late:
         return {channel: (by_holding, by_holding, by_holding) for channel in channels}
     free, found = _with_delays(t, problem), dict[Channel, tuple[float, float, float]]()
@@ -98,14 +102,20 @@ def _forces(structure: Structure, nuisances: Nuisances) -> list[Channel]:
     return [channel for channel in channels if channel not in known]
 
 
+def _by_holding(way: Reconstruction) -> float:
+    """Samples by which the way of a force between its samples makes it late, as its delay is counted."""
+    return -0.5 if way == "hold" else 0.0
+
+
 def _with_delays(t: Trial, problem: Problem) -> Trial:
     """The trial with the delays of the forces among its unknowns, none so far."""
     dt, structure, unknowns = problem.first.record.dt, t.structure, list(t.unknowns)
+    low = -_FARTHEST - _by_holding(problem.first.reconstruction)
     for channel in _forces(structure, problem.first):
         sensor = ForceDelay(0.0, at=channel)
         structure = structure + sensor
         path = f"{sensor.kind}@{sensor.place}.tau"
-        unknowns.append(Unknown(path, 0.0, dt, False, 0.0, _USUAL, low=-_FARTHEST, high=_FARTHEST))
+        unknowns.append(Unknown(path, 0.0, dt, False, 0.0, _USUAL, low=low, high=_FARTHEST))
     theta = np.concatenate([t.theta, np.zeros(len(unknowns) - t.theta.size)])
     return replace(t, structure=structure, unknowns=tuple(unknowns), theta=theta)
 
@@ -129,19 +139,21 @@ def _prior_of_delays(count: int) -> float:
     return count * float(np.log(_USUAL) + 0.5 * np.log(2 * np.pi))
 
 
-def _fitted(beside: Trial, problem: Problem, way: _Way) -> _Timed:
-    """A trial fitted again where the force goes some way."""
+def _fitted(beside: Trial, problem: Problem, way: _Way) -> Iterator[_Timed]:
+    """A trial fitted again where the force goes some way; none where it would be later than it may be."""
     other, theta = problem.timed(way.reconstruction, {}), beside.theta
     if way.late:
         free = _with_delays(beside, other)
         found = settle(other.posterior_of(free), free.theta, problem.limit)
-        theta = found.theta[0, : beside.theta.size]
-        delays = found.theta[0, beside.theta.size :] * problem.first.record.dt
+        theta, delays = np.split(found.theta[0], [beside.theta.size])
+        if any(not u.low < delay < u.high for u, delay in zip(free.unknowns[theta.size :], delays, strict=True)):
+            return
+        seconds = (delays * problem.first.record.dt).tolist()
         channels = _forces(beside.structure, problem.first)
-        other = problem.timed(way.reconstruction, dict(zip(channels, delays.tolist(), strict=True)))
+        other = problem.timed(way.reconstruction, dict(zip(channels, seconds, strict=True)))
     posterior = other.posterior_of(beside)
     found = settle(posterior, theta, problem.limit)
-    return _Timed(other, trial(posterior, found, 0, beside.rung, beside.label, beside.effects), way.late)
+    yield _Timed(other, trial(posterior, found, 0, beside.rung, beside.label, beside.effects), way.late)
 
 
 def _likeliest(found: list[_Timed]) -> _Timed:

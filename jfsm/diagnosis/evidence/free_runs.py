@@ -147,7 +147,7 @@ def _compared(
     counted = _counted(record, stretches, window, begin)
     by_pieces = partial(run_over, stretches=stretches, window=window)
     before = by_pieces(models["before"], record, reconstruction=assumed)
-    record, run_of = record.aligned(fitted.late), partial(by_pieces, reconstruction=fitted.reconstruction)
+    record, run_of = fitted.in_time(record), partial(by_pieces, reconstruction=fitted.reconstruction)
     runs = {"before": before} | {name: run_of(models[name], record) for name in ("refitted", "after")}
     left = _noise(partial(run_of, models["after"]), record, counted, runs["after"], noise, fitted.memories, rng)
     off = {name: _off(run, record, counted, wandering) for name, run in runs.items()}

@@ -1,15 +1,15 @@
 """Trials of records as evidence, and what is behind it: structures, maps and runs over held-out readings."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import jax
 
-from ...plant import Channel, Reconstruction
+from ...plant import Reconstruction
 from ...structures import Clipping, Structure
-from ..channels.clock import late_channels, lateness
+from ..channels.clock import Lateness, late_channels, lateness
 from ..channels.delays import Late, showing_late
 from ..hypotheses.effect import key_of
 from ..search.batches import LeftBehind
@@ -76,10 +76,10 @@ class Weighed:
         self._held_out(key)
         return self.runs.get(key, (None, []))
 
-    def late(self, decision: Decision) -> Mapping[Channel, tuple[float, float, float]]:
-        """How late the forces are beside what was decided, by channel, with the 95 % interval [s]."""
-        known = decision.winner in self._trials
-        return lateness(self.trial(decision.winner) if known else self.found.refitted, self.problem)
+    def late(self, decision: Decision) -> Lateness:
+        """How late the forces are beside what was decided, by channel."""
+        beside = self._trials.get(decision.winner, self.found.refitted)
+        return lateness(beside, self.problem, self.held_out.assumed)
 
     def extended(self, decision: Decision, late: Late) -> Structure:
         """The structure to go on with, as it shows in channels that are so late."""
@@ -99,7 +99,7 @@ class Weighed:
             model_error=self.model_error,
             finished=not self.problem.limit.over,
             clipped=tuple(sensor.at for sensor in self.clipped),
-            late=tuple(late_channels(self.held_out.model, self.problem)),
+            late=tuple(late_channels(self.held_out.model, self.problem, self.held_out.assumed)),
             late_changes=change_by_times(self.held_out.stated, self.problem.first, self.held_out.assumed),
         )
 

@@ -1,13 +1,14 @@
 """A diagnosis, assembled from a decision and what was measured for it."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from ...plant import Channel, Reconstruction
+from ...plant import Reconstruction
 from ...structures import AbstractTerm, Clipping, Structure
 from .._diagnosis import CandidateResult, Diagnosis
 from ..advice.detection_limits import Smallest
 from ..advice.next_test import Leading
+from ..channels.clock import Lateness
 from ..channels.coloured_noise import memories
 from ..channels.drift import zeros
 from ..channels.stationarity import unsteady
@@ -55,7 +56,7 @@ class Reached(NamedTuple):
     term: AbstractTerm | None
     evidence: Evidence
     assumed: Reconstruction
-    late: Mapping[Channel, tuple[float, float, float]]
+    late: Lateness
 
 
 def assemble(

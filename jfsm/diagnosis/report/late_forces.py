@@ -1,18 +1,16 @@
 """Forces that act later than they were recorded, in words."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 from ...identification import Nuisances
 from ...plant import Channel, Reconstruction
 from ...structures import causes
 from .._diagnosis import Estimate, Finding, Rival
+from ..channels.clock import Lateness
 from ..evidence.evidence import Setting
 from ..thresholds import THRESHOLDS
 from .law_class import class_of
 from .sentences import finding_sentence
-
-Lateness = Mapping[Channel, tuple[float, float, float]]
-"""How late forces are, by channel, with the 95 % interval [s]; negative where they act later than was recorded."""
 
 PROBABILITY = 0.99
 """That a force is late that was found so: its evidence is beyond doubt, and a law that looks like it was tried."""

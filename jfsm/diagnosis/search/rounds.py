@@ -83,7 +83,9 @@ class Rounds:
         if not effects:
             return singles, other
         both = self._pairs(effects, best, singles, louder)
-        return both, None if self._limit.over else coloured(self._likeliest(both.every), self.problem)
+        if self._limit.over:
+            return both, None
+        return both, self._with_other_times(both.every) or coloured(self._likeliest(both.every), self.problem)
 
     @property
     def _limit(self) -> Limit:

@@ -11,7 +11,7 @@ from ..._limit import Limit
 from ...identification import prepare_all
 from ...plant import Reconstruction
 from ...records import Record
-from ...structures import Cause, Structure
+from ...structures import AttachedOscillator, Cause, DelayedForce, Maxwell, Structure
 from ..channels.clock import WAYS, in_its_time
 from ..channels.drift import PLAINLY, steadied, wandering
 from ..evidence.between_records import differ
@@ -25,12 +25,14 @@ from ..hypotheses.parametrisation import Apart
 from ..thresholds import THRESHOLDS
 from .baseline import believed, refit_from
 from .rounds import Rounds, Searched, amid_noise
-from .searches import search_again
+from .searches import search, search_again
 from .segments import pieces
 from .steps import Steps
 
 _AS_LIKELY = 3.0
 """Nats by which trials are apart, at most, of which none is likelier than the other."""
+_LAGGING = AttachedOscillator, DelayedForce, Maxwell
+"""Laws that are linear but for their memory: in some motions they look like a force that is late."""
 
 Studied = tuple[Problem, list[Candidate], Searched]
 """What was fitted to, what could be tried, and what was found."""
@@ -113,7 +115,10 @@ class Study:
             return problem, [], Searched(given, refitted, [], [], [], LackOfFit(problem))
         other = in_its_time(refitted, problem, to_noise=True)
         if other is not None:
-            return self._sought_with(other, problem, given, refitted, known)
+            late = self._sought_with(other, problem, given, refitted, known)
+            if not self._lags(late, problem, given, refitted):
+                return late
+            return self._sought(problem._replace(ways=()), given, refitted, known)
         channel = wandering(refitted, problem, PLAINLY)
         if channel is not None:
             return self._sought_with(problem.with_wandering(channel), problem, given, refitted, known)
@@ -124,6 +129,18 @@ class Study:
             return problem, every, found
         studied = self._sought_with(other, problem, given, refitted, known)
         return (problem, every, found) if self.limit.over else studied
+
+    def _lags(self, late: Studied, problem: Problem, given: Trial, refitted: Trial) -> bool:
+        """Whether a law by which the structure lags is likelier than a late force, beside which nothing was found."""
+        best = max(late[2].every, key=lambda t: t.evidence)
+        if best.effects or self.limit.over:
+            return False
+        every = candidates(self.model, problem.records, self.chosen, self.places)
+        lagging = [c for c in every if c.starts and c.effects[0].cause.effect in _LAGGING]
+        if not lagging:
+            return False
+        tried = search(lagging, given, refitted, problem, self.steps.of("laws that lag like a late force"))
+        return any(t.evidence > best.evidence for t in tried.trials)
 
     def _sought_with(
         self, other: Problem, problem: Problem, given: Trial, refitted: Trial, known: Trial | None
