@@ -1,5 +1,6 @@
 """Forces that act later than they were recorded, or otherwise between their samples, on data that SciPy made."""
 
+import json
 from collections.abc import Callable
 from typing import Any
 
@@ -10,7 +11,7 @@ from scipy.integrate import solve_ivp
 from test_verdict import evidence_of, given, refit
 
 import jfsm
-from jfsm.diagnosis import judge
+from jfsm.diagnosis import Evidence, judge
 from jfsm.diagnosis.channels.clock import WAYS, in_its_time, lateness
 from jfsm.diagnosis.evidence.as_recorded import change_by_times
 from jfsm.diagnosis.evidence.setup import Problem
@@ -140,7 +141,9 @@ def test_a_late_force_is_a_cause_though_nothing_else_is_wrong():
     again = np.asarray(jfsm.simulate(d.extended, record).displacement)[:, 0]
     assert np.std(again - np.asarray(record.displacement)[:, 0]) < 0.1 * d.gain.before * np.std(y)
     (row,) = [check for check in d.decision.checks if check.name == "acts_in_time"]
-    assert not row.passed and row.of == "force_delay@force-1"
+    assert not row.passed and row.of == "force_delay@force:1"
+    assert "acts_in_time" in d.why("force_delay") and "acts_in_time" in d.why()
+    assert judge(Evidence.of_plain(json.loads(json.dumps(d.data["evidence"])))).verdict == "cause"
 
 
 def test_a_force_that_is_hardly_late_is_said_and_no_cause():

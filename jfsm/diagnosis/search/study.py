@@ -122,7 +122,7 @@ class Study:
         channel = wandering(refitted, problem, PLAINLY)
         if channel is not None:
             return self._sought_with(problem.with_wandering(channel), problem, given, refitted, known)
-        every = candidates(self.model, [steadied(n) for n in problem.records], self.chosen, self.places)
+        every = self._candidates(problem)
         rounds = Rounds(every, given, refitted, known, problem, self.steps, self.key, self.pairs)
         found, other = rounds.run()
         if other is None or self.limit.over:
@@ -130,13 +130,18 @@ class Study:
         studied = self._sought_with(other, problem, given, refitted, known)
         return (problem, every, found) if self.limit.over else studied
 
+    def _candidates(self, problem: Problem) -> list[Candidate]:
+        """What could be tried: not the delay of a force of which it is known."""
+        every = candidates(self.model, [steadied(n) for n in problem.records], self.chosen, self.places)
+        known = {("force_delay", channel) for channel in problem.first.late}
+        return [c for c in every if (c.effects[0].cause.id, c.effects[0].at) not in known]
+
     def _lags(self, late: Studied, problem: Problem, given: Trial, refitted: Trial) -> bool:
         """Whether a law by which the structure lags is likelier than a late force, beside which nothing was found."""
         best = max(late[2].every, key=lambda t: t.evidence)
         if best.effects or self.limit.over:
             return False
-        every = candidates(self.model, problem.records, self.chosen, self.places)
-        lagging = [c for c in every if c.starts and c.effects[0].cause.effect in _LAGGING]
+        lagging = [c for c in self._candidates(problem) if c.starts and c.effects[0].cause.effect in _LAGGING]
         if not lagging:
             return False
         tried = search(lagging, given, refitted, problem, self.steps.of("laws that lag like a late force"))

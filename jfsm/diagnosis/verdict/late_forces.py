@@ -13,7 +13,7 @@ def beside_late_forces(decision: Decision, setting: Setting, limits: Thresholds)
     model as given."""
     says = f"its lateness changes a run of the model as given by {setting.late_changes:.2%} of the signal"
     rows = tuple(
-        checked("acts_in_time", f"force_delay@{kind}-{j}", setting.late_changes, limits.negligible, says)
+        checked("acts_in_time", f"force_delay@{kind}:{j}", setting.late_changes, limits.negligible, says)
         for kind, j in setting.late
     )
     decision = replace(decision, checks=(*rows, *decision.checks))
