@@ -92,10 +92,11 @@ alone.
 ## Table of verdicts
 """
 
-REMARK = """A channel that is cut off at a limit is a cause whatever else cannot be told. Where no cause is named, all
-hypotheses are compared once more with a share of the elastic force admitted as model error, if that makes the best of
-them likelier. A map that explains much of what an admissible cause leaves comes before the name of that cause, however
-probable it is; the class of its law is named all the same where runs over held-out readings confirm it.
+REMARK = """A channel that is cut off at a limit is a cause whatever else cannot be told. So is a force that acts
+later than it was recorded, where nothing else is wrong and that changes a run of the model as given. Where no cause is
+named, all hypotheses are compared once more with a share of the elastic force admitted as model error, if that makes
+the best of them likelier. A map that explains much of what an admissible cause leaves comes before the name of that
+cause, however probable it is; the class of its law is named all the same where runs over held-out readings confirm it.
 """
 
 TAIL = """## To change something

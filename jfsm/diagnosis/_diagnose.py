@@ -16,7 +16,7 @@ from ._diagnosis import Diagnosis
 from .advice.detection_limits import Silence, Smallest, detectable, naturally_detectable
 from .advice.next_test import Leading
 from .channels.clipping import limited
-from .channels.delays import Late, in_time, showing_late, slightly_late
+from .channels.delays import Late, in_time, slightly_late
 from .channels.drift import steadied
 from .evidence.fitted import Trial
 from .evidence.measured import HeldOutRuns, Weighed
@@ -47,15 +47,16 @@ def diagnose(
     key: jax.Array | None = None,
     *,
     places: Sequence[tuple[int, int]] | None = None,
-    reconstruction: Reconstruction = "band-limited",
+    reconstruction: Reconstruction | None = None,
     time_limit: float | None = None,
     progress: Progress | bool | None = None,
 ) -> Diagnosis:
     """What `model` gets wrong about `record`, the name of the cause, and the gain of mending it.
 
     Where the motion is imposed (``drive="motion"``) it is judged by the force that was measured. Of the sensors' faults
-    only a late force is looked for then: a gain of the force is that of all own values. A channel that is late by less
-    than a sample is no finding: it is put in time, and the verdict is that of the rest.
+    only a late force is looked for then: a gain of the force is that of all own values. A response channel that is late
+    by less than a sample is no finding: it is put in time, and the verdict is that of the rest. A force that is late,
+    or held between its samples, is a finding where that changes a run of `model` as given.
 
     Parameters
     ----------
@@ -77,8 +78,9 @@ def diagnose(
         Source of the few draws (the floor of the gain); made at the call when None.
     places : sequence of links, optional
         Where laws and loads are tried; by default laws on the model's links, loads on every mass.
-    reconstruction : "band-limited", "linear" or "hold"
-        The force between its samples: band-limited for whatever was filtered before it was sampled.
+    reconstruction : "band-limited", "linear" or "hold", optional
+        The force between its samples. By default band-limited, as whatever was filtered before it was sampled, unless
+        another one turns out far likelier.
     time_limit : float, optional
         Seconds after which the best verdict so far is given, marked as unfinished. The first interrupt (Ctrl-C) does
         the same; a second one stops everything.
@@ -123,7 +125,7 @@ def _diagnosed(
     max_causes: int,
     key: jax.Array | None,
     places: Sequence[tuple[int, int]] | None,
-    reconstruction: Reconstruction,
+    reconstruction: Reconstruction | None,
     limit: Limit,
     steps: Steps,
 ) -> Diagnosis:
@@ -141,11 +143,13 @@ def _diagnosed(
     study = Study(model, chosen, places, reconstruction, key, steps, limit, pairs=max_causes > 1)
     problem, every, found, held, late = _looked_into(record, holdout, study)
     steps.next("the verdict, and its gain on held-out readings")
-    weighed = Weighed(found, problem, clipped, HeldOutRuns(stated, model, held, key))
+    assumed = study.ways[0]
+    weighed = Weighed(found, problem, clipped, HeldOutRuns(stated, model, held, key, assumed))
     decision = judge(weighed.evidence)
     behind = weighed.behind(decision)
     judged, tried, winner = behind.problem, behind.found, behind.trial(decision.winner)
-    extended, (gain, runs) = behind.extended(decision), behind.gain(decision)
+    late_forces, (gain, runs) = behind.late(decision), behind.gain(decision)
+    extended = behind.extended(decision, {**late, **{channel: tau[0] for channel, tau in late_forces.items()}})
     steps.next("the missing force")
     term = next(iter(winner.laws), None) if decision.verdict == "cause" else None
     first, fitted, refitted = judged.first, judged.until[0], tried.refitted
@@ -153,13 +157,11 @@ def _diagnosed(
     rest = residual(winner.structure, steadied(first), fitted) if leaves_something(decision, winner) else None
     steps.next("what would have been seen")
     seen = _would_have_been_seen(decision.verdict, every, tried, judged)
-    if decision.verdict != "consistent":
-        extended = showing_late(extended, late)
     unfinished = Unfinished.of(chosen, tried, limit, cut=not decision.finished, pairs=study.pairs)
     tested = Tested(tried.trials, tried.behind, tried.left_out, seen, tried.lack.known, unfinished)
     leading = Leading.of(model, [refitted, *tried.trials], lambda t: decision.probability(t.key), first, fitted)
     steps.end()
-    reached = Reached(decision, winner, term, weighed.evidence, rest)
+    reached = Reached(decision, winner, term, weighed.evidence, rest, assumed, late_forces)
     return assemble(reached, clipped, refitted, tested, judged, extended, missing, gain, runs, leading)
 
 
@@ -197,7 +199,7 @@ def _looked_into(
             break
         problem, every, found = studied
         reached = problem, every, found, held, late
-        late = slightly_late(found.every, late, problem.first.record.dt)
+        late = slightly_late(found.every, late, problem.first.record)
         if late == reached[-1] or study.limit.over:
             break
     assert reached is not None

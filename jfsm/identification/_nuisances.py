@@ -30,7 +30,7 @@ from ..plant import (
     substeps_for,
     typical_size,
 )
-from ..records import Record, clipped, noise_floor, quantisation_step, spikes
+from ..records import Record, advanced, clipped, noise_floor, quantisation_step, spikes
 from ..structures import Structure
 from ._channels import LEAST_NOISE, driving, forces, readings_of, spread_of
 from ._colour import Colour
@@ -113,6 +113,8 @@ class Nuisances:
         Share of the elastic force that no hypothesis has to explain: what all of them lack.
     colour : Colour or None
         Memory of the channels' noise, where it is known to have one.
+    late : dict
+        How late [s] channels of the force were that are in time here, by (kind, degree of freedom).
     stretches : dict
         What programs saw of the record, kept for the next of them.
     """
@@ -142,6 +144,7 @@ class Nuisances:
     path: Path | None = None
     forgiven: float = 0.0
     colour: Colour | None = None
+    late: Mapping[Channel, float] = field(default_factory=dict)
     stretches: dict[int, Stretch] = field(default_factory=dict, init=False, repr=False)
     _heads: dict[int, tuple[Imposed, Readings]] = field(default_factory=dict, init=False, repr=False)
 
@@ -238,6 +241,23 @@ class Nuisances:
             force_covariance=self.force_covariance * louder,
             colour=colour,
         )
+
+    def in_time(self, record: Record) -> Record:
+        """Another record with the channels of the force put in time that were late in this one."""
+        return record.aligned({channel: tau for channel, tau in self.late.items() if channel in record.channels})
+
+    def timed(self, reconstruction: Reconstruction, late: Mapping[Channel, float]) -> "Nuisances":
+        """The same record, its force so between its samples, and channels of it put in time that are so late [s]."""
+        assert isinstance(self.inputs, InterpolatedInput)
+        late = {channel: tau for channel, tau in late.items() if channel in self.record.channels}
+        record, inputs, dt = self.record.aligned(late), self.inputs, self.record.dt
+        force, base = (np.array(drive)[: self.samples, 0] for drive in (inputs.force, inputs.base))
+        for (_, j), tau in late.items():
+            force[:, j - 1] = advanced(force[:, j - 1], tau / dt, dt)
+        length, dof = inputs.time.shape[0], force.shape[1]
+        inputs = excitation(record, dof, inputs.substeps, reconstruction, length=length, force=force, base=base)
+        every = {channel: self.late.get(channel, 0.0) + late.get(channel, 0.0) for channel in {**self.late, **late}}
+        return replace(self, record=record, inputs=inputs, reconstruction=reconstruction, late=every)
 
     def knowing(self, other: "Nuisances") -> "Nuisances":
         """The same record, with what is known of the same channels of another: which zeros wander, and what noise

@@ -205,7 +205,7 @@ _CAUSES = (
           "a harmonic force that nobody measured"),
     Cause("force_gain", "sensor", "a gain error of the force sensor", ForceGain, 0,
           "it reads too much or too little by a fixed share"),
-    Cause("force_delay", "sensor", "a delay of the force sensor", ForceDelay, 0,
+    Cause("force_delay", "sensor", "a delay of the force", ForceDelay, 0,
           "it is late or early by a fixed time"),
     Cause("accel_bias", "sensor", "a bias of the accelerometer", AccelerationBias, 0,
           "it reads too much or too little by a fixed amount"),

@@ -1,4 +1,4 @@
-"""Channels that are late by less than a sample, as every sensor may be: they are no finding, and are shifted back."""
+"""Responses that are late by less than a sample, as every sensor may be: they are no finding, and are shifted back."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -23,17 +23,26 @@ _FARTHER = 4.0
 """Multiple of the gain by a parabola about no delay that a longer delay may reach."""
 
 
-def slightly_late(trials: Sequence[Trial], known: Late, dt: float) -> Late:
-    """How late channels are by the likeliest trial, on top of what is `known`; that alone where nothing is new.
+def slightly_late(trials: Sequence[Trial], known: Late, record: Record) -> Late:
+    """How late response channels of a record are by the likeliest trial, on top of what is `known`; that alone where
+    nothing is new.
 
-    Each is so by less than a sample, and the same trial with all channels in time is far less likely.
+    Each is so by less than a sample, and the same trial with all channels in time is far less likely. The force is none
+    of them, nor a response by which alone it is told that the force is in time.
     """
     best = max(trials, key=lambda t: t.evidence)
     delays = [part for part in best.parts if isinstance(part, _DELAYS)]
-    slight = all(abs(part.tau) < dt for part in delays)
-    if not (delays and slight and best.evidence > _in_time_evidence(best, trials) + THRESHOLDS.significant):
+    if not delays or not all(_is_slight(part, record) for part in delays):
+        return known
+    if best.evidence <= _in_time_evidence(best, trials) + THRESHOLDS.significant:
         return known
     return {**known, **{part.at: known.get(part.at, 0.0) + float(part.tau) for part in delays}}
+
+
+def _is_slight(part: ForceDelay | ChannelDelay, record: Record) -> bool:
+    """Whether a response channel is late by less than a sample, and others tell the time."""
+    tells = len(record.responses) > 1 or len(record.channels) == 1
+    return tells and isinstance(part, ChannelDelay) and abs(part.value) < record.dt
 
 
 def _in_time_evidence(best: Trial, trials: Sequence[Trial]) -> float:
@@ -43,7 +52,14 @@ def _in_time_evidence(best: Trial, trials: Sequence[Trial]) -> float:
 
 
 def seems_late(beside: Trial, problem: Problem) -> ChannelDelay | None:
-    """The delay, of less than a sample, of a channel that would make a trial without delays far likelier, if any.
+    """The delay, of less than a sample, of a channel that would make a trial without delays far likelier, if any."""
+    found = likeliest_delay(beside, problem)
+    return None if found is None or found[1] < THRESHOLDS.searched else found[0]
+
+
+def likeliest_delay(beside: Trial, problem: Problem) -> tuple[ChannelDelay, float] | None:
+    """The delay of a channel, of less than a sample, by which a trial gains most, and so many nats; None where none is
+    seen.
 
     The trial's numbers stay: a parabola through what it is worth a quarter of a sample earlier and later.
     """
@@ -55,9 +71,9 @@ def seems_late(beside: Trial, problem: Problem) -> ChannelDelay | None:
         if curvature > 0 and abs(slope) * _STEP < curvature:
             found[channel] = slope**2 / (2 * curvature), -slope / curvature * _STEP
     most = max(found, key=lambda channel: found[channel], default=None)
-    if most is None or found[most][0] < THRESHOLDS.searched:
+    if most is None:
         return None
-    return ChannelDelay(found[most][1] * problem.first.record.dt, at=most)
+    return ChannelDelay(found[most][1] * problem.first.record.dt, at=most), found[most][0]
 
 
 def gain_of_delay(beside: Trial, channel: tuple[str, int], problem: Problem) -> float:

@@ -62,8 +62,8 @@ class Course(NamedTuple):
         wandering = [fitted.channels[c] for c in fitted.readings.wandering]
         whole = part.led_by(_lead(structure, period)) if length is None else (part.record[part.begin :], 0)
         record, begin = _cleaned(whole[0], wandering, noise, rng), whole[1]
-        stretches = _stretches(record, length)
-        window = _window(min(s.stop - s.start for s in stretches), period)
+        stretches = stretches_of(record, length)
+        window = window_of(min(s.stop - s.start for s in stretches), period)
         return cls(record, begin, stretches, window, _counted(record, stretches, window, begin), wandering)
 
     def run(self, model: Structure, record: Record, reconstruction: Reconstruction) -> Run:
@@ -100,7 +100,7 @@ def in_parts(fitted: Nuisances) -> float | None:
     return (FILTERED + PREDICTED) * fitted.period if fitted.drifts else None
 
 
-def _window(samples: int, period: float) -> int:
+def window_of(samples: int, period: float) -> int:
     """Samples from which the start of a run of so many is estimated, which are not counted; a period has `period`."""
     return min(max(50, math.ceil(FILTERED * period)), samples // 3)
 
@@ -127,7 +127,7 @@ def _cleaned(record: Record, wandering: Sequence[tuple], noise: Mapping[tuple, f
     return remeasured(record, shown, {}, rng)
 
 
-def _stretches(record: Record, length: float | None) -> list[slice]:
+def stretches_of(record: Record, length: float | None) -> list[slice]:
     """Stretches of a record that are run one by one: the whole, or at most `length` seconds each.
 
     In a longer one what nothing holds in place goes astray, however right the model.

@@ -41,7 +41,8 @@ class Setting(NamedTuple):
     """What is the same for all hypotheses.
 
     `periods` of motion in the records; whether the motion is `imposed`; the share of the elastic force that is admitted
-    as `model_error` to all; whether the search was `finished`; channels that are `clipped`, as (kind, number).
+    as `model_error` to all; whether the search was `finished`; channels that are `clipped`, as (kind, number); forces
+    that are `late`, and the share of the signal by which that changes a run of the model as given.
     """
 
     periods: float
@@ -49,6 +50,8 @@ class Setting(NamedTuple):
     model_error: float = 0.0
     finished: bool = True
     clipped: tuple[tuple[str, int], ...] = ()
+    late: tuple[tuple[str, int], ...] = ()
+    late_changes: float = 0.0
 
 
 class Measure(NamedTuple):
@@ -124,7 +127,8 @@ class Evidence:
     @classmethod
     def of_plain(cls, written: Mapping[str, Any]) -> "Evidence":
         """What `plain` was made of; of what was not asked then it raises `NotMeasuredError`."""
-        setting = Setting(**{**written["setting"], "clipped": tuple((k, n) for k, n in written["setting"]["clipped"])})
+        channels = {name: tuple((k, n) for k, n in written["setting"].get(name, ())) for name in ("clipped", "late")}
+        setting = Setting(**{**written["setting"], **channels})
         cards = [Scorecard.of_plain(card) for card in written["cards"]]
         made = {what: _MADE[what] for what in written["asked"]}
         asked = {

@@ -13,6 +13,7 @@ import jax
 import numpy as np
 
 from ...identification import Nuisances
+from ...plant import Reconstruction
 from ...structures import Structure
 from .course import Course, agrees_for, in_parts, strayed
 from .fitted import PREDICTED
@@ -81,22 +82,22 @@ def measure_gain(
     noise: Mapping[tuple, float],
     fitted: Nuisances,
     key: jax.Array,
+    assumed: Reconstruction = "band-limited",
     *,
     beyond_refit: bool = False,
 ) -> tuple[Gain, list[dict]]:
     """Gain on what was held out, and per record the curves behind it (measured, before, after).
 
     `noise` is the standard deviation of each channel's noise; `fitted` tells how long a period is, whether anything
-    holds the structure in place, which zeros wander, and what the force does between its samples. Where nothing holds
-    it many short runs take the place of a long one; so they do where noise alone makes the runs of the extended model
-    part, as far as they agree. What is closed counts from the model as given, or `beyond_refit` from the refitted one.
+    holds the structure in place, which zeros wander, and when the force acts. The model as given runs as the force was
+    recorded, and goes between its samples as is `assumed`. Where nothing holds a structure in place many short runs
+    take the place of a long one; so they do where noise alone makes the runs of the extended model part, as far as they
+    agree. What is closed counts from the model as given, or `beyond_refit` from the refitted one.
     """
     rng = np.random.default_rng(np.asarray(jax.random.key_data(key)).astype(np.uint32).tolist())
-
     without = "refitted" if beyond_refit else "before"
     models = [{"before": given, "refitted": refitted(part.of), "after": extended(part.of)} for part in held]
-
-    compared, horizon = _as_far_as_runs_agree(held, models, noise, fitted, rng, without)
+    compared, horizon = _as_far_as_runs_agree(held, models, noise, fitted, assumed, rng, without)
     channels = _channel_gains([each.squares for each in compared], held[0].record.units, beyond_refit=beyond_refit)
     total = {
         name: math.sqrt(float(np.mean([(getattr(c, name) / c.spread) ** 2 for c in channels.values()])))
@@ -128,6 +129,7 @@ def _as_far_as_runs_agree(
     models: Sequence[Mapping[str, Structure]],
     noise: Mapping[tuple, float],
     fitted: Nuisances,
+    assumed: Reconstruction,
     rng: np.random.Generator,
     without: str,
 ) -> tuple[list[_Compared], float | None]:
@@ -135,7 +137,7 @@ def _as_far_as_runs_agree(
 
     def compared(length: float | None) -> list[_Compared]:
         pairs = zip(held, models, strict=True)
-        return [_compared(part, each, noise, fitted, rng, length, without) for part, each in pairs]
+        return [_compared(part, each, noise, fitted, assumed, rng, length, without) for part, each in pairs]
 
     found = compared(in_parts(fitted))
     apart = [each.agrees for each in found if each.agrees is not None]
@@ -152,6 +154,7 @@ def _compared(
     models: Mapping[str, Structure],
     noise: Mapping[tuple, float],
     fitted: Nuisances,
+    assumed: Reconstruction,
     rng: np.random.Generator,
     length: float | None,
     without: str,
@@ -159,8 +162,10 @@ def _compared(
     """Runs of models over a held-out record, `length` seconds at a time, with their errors and those that noise alone
     leaves; blocks are of the run `without` the hypothesis and of that with it."""
     course, period = Course.of(part, models["after"], fitted, noise, rng, length), fitted.period / part.record.dt
+    before = course.run(models["before"], course.record, assumed)
+    course = course._replace(record=fitted.in_time(course.record))
     run_of = partial(course.run, reconstruction=fitted.reconstruction)
-    runs = {name: run_of(model, course.record) for name, model in models.items()}
+    runs = {"before": before} | {name: run_of(models[name], course.record) for name in ("refitted", "after")}
     draws = strayed(partial(run_of, models["after"]), course.record, runs["after"], noise, fitted.memories, rng)
     off, spread = {name: course.off(run) for name, run in runs.items()}, course.spread(noise)
     squares = {name: {c: float(np.mean(error**2)) for c, error in errors.items()} for name, errors in off.items()}

@@ -8,13 +8,17 @@ from functools import cached_property
 import jax
 import numpy as np
 
+from ...plant import Reconstruction
 from ...structures import Clipping, Structure
+from ..channels.clock import Lateness, late_channels, lateness
+from ..channels.delays import Late, showing_late
 from ..hypotheses.effect import key_of
 from ..nats import many
 from ..search.batches import LeftBehind
 from ..search.rounds import Searched
 from ..thresholds import THRESHOLDS
 from ..verdict.decision import Decision
+from .as_recorded import change_by_times
 from .evidence import Evidence, Measure, SetAside, Setting, has_map, map_on
 from .fitted import Trial
 from .free_runs import Gain, measure_gain
@@ -31,13 +35,14 @@ from .split import HeldOut
 
 @dataclass(frozen=True)
 class HeldOutRuns:
-    """What was held out, the model as it was `stated` and with the clipping that its records show, and a source of
-    noise."""
+    """What was held out, the model as it was `stated` and with the clipping that its records show, a source of noise,
+    and how a force was `assumed` to go between its samples."""
 
     stated: Structure
     model: Structure
     held: Sequence[HeldOut]
     key: jax.Array
+    assumed: Reconstruction
 
 
 @dataclass
@@ -74,10 +79,15 @@ class Weighed:
         self._held_out(key)
         return self.runs.get(key, (None, []))
 
-    def extended(self, decision: Decision) -> Structure:
-        """The structure to go on with."""
+    def late(self, decision: Decision) -> Lateness:
+        """How late the forces are beside what was decided, by channel."""
+        beside = self._trials.get(decision.winner, self.found.refitted)
+        return lateness(beside, self.problem, self.held_out.assumed)
+
+    def extended(self, decision: Decision, late: Late) -> Structure:
+        """The structure to go on with, as it shows in channels that are so late."""
         key = self._handed_out(decision)
-        return self.held_out.model if key == GIVEN else self.trial(key).extended()
+        return self.held_out.model if key == GIVEN else showing_late(self.trial(key).extended(), late)
 
     def _handed_out(self, decision: Decision) -> str:
         """Key of the hypothesis to go on with: never one that runs worse over held-out readings than as given."""
@@ -102,6 +112,8 @@ class Weighed:
             model_error=self.model_error,
             finished=not self.problem.limit.over,
             clipped=tuple(sensor.at for sensor in self.clipped),
+            late=tuple(late_channels(self.held_out.model, self.problem, self.held_out.assumed)),
+            late_changes=change_by_times(self.held_out.stated, self.problem.first, self.held_out.assumed),
         )
 
     def _cards(self) -> Iterator[Scorecard]:
@@ -142,7 +154,15 @@ class Weighed:
             noise = noise_levels(trial, first)
             beyond_refit = has_map(key) or bool(trial.effects)
             self.runs[key] = measure_gain(
-                runs.stated, refitted.extended, extended, runs.held, noise, first, runs.key, beyond_refit=beyond_refit
+                runs.stated,
+                refitted.extended,
+                extended,
+                runs.held,
+                noise,
+                first,
+                runs.key,
+                runs.assumed,
+                beyond_refit=beyond_refit,
             )
         return self.runs[key][0].errors
 

@@ -1,10 +1,11 @@
 """What hypotheses are fitted to: a model, records of what it simulates, and how much of each is fitted."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from ..._limit import UNLIMITED, Limit
 from ...identification import Colour, Hypothesis, Nuisances, Posterior, prepare_all
+from ...plant import Channel, Reconstruction
 from ...records import Record
 from ...structures import Structure
 from ..hypotheses.initial_values import Begin
@@ -14,13 +15,17 @@ from .fitted import Trial
 
 class Problem(NamedTuple):
     """A model, records as the likelihood sees them, how many samples of each are fitted, what they do not share, and
-    how long that may go on."""
+    how long that may go on.
+
+    `ways` are those in which a force may go between its samples, as long as that is not known.
+    """
 
     model: Structure
     records: Sequence[Nuisances]
     until: Sequence[int]
     apart: Apart = Apart.nothing
     limit: Limit = UNLIMITED
+    ways: Sequence[Reconstruction] = ()
 
     @property
     def first(self) -> Nuisances:
@@ -49,6 +54,17 @@ class Problem(NamedTuple):
     def knowing(self, other: "Problem") -> "Problem":
         """The same, with what another problem of the same channels tells of these."""
         return self._replace(records=[n.knowing(other.first) for n in self.records])
+
+    def timed(self, reconstruction: Reconstruction, late: Mapping[Channel, float]) -> "Problem":
+        """The same, it being known how the force goes between its samples, and which channels of it are so late [s]."""
+        return self._replace(records=[n.timed(reconstruction, late) for n in self.records], ways=())
+
+    def as_timed(self, other: "Problem") -> "Problem":
+        """The same, with the times of its forces that another problem of the same channels knows."""
+        now, then = self.first, other.first
+        if (now.reconstruction, dict(now.late)) == (then.reconstruction, dict(then.late)):
+            return self._replace(ways=other.ways)
+        return self.timed(then.reconstruction, then.late)._replace(ways=other.ways)
 
     def with_wandering(self, channel: int) -> "Problem":
         """The same, the zero of one more channel wandering."""

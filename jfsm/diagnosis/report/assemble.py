@@ -3,10 +3,12 @@
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
+from ...plant import Reconstruction
 from ...structures import AbstractTerm, Clipping, Structure
 from .._diagnosis import CandidateResult, Diagnosis
 from ..advice.detection_limits import Smallest
 from ..advice.next_test import Leading
+from ..channels.clock import Lateness
 from ..channels.coloured_noise import memories
 from ..channels.drift import zeros
 from ..channels.stationarity import unsteady
@@ -25,6 +27,7 @@ from ..verdict.judge import evidence_behind
 from .estimates import Units, noise_by_channel, refitted_values, smallest_effects, unit_of
 from .findings import Ranked, findings_of, fitted_candidate, unfitted_candidate
 from .force_shape import Shape, shape_of
+from .late_forces import beside_late_forces, late_forces, times_of_forces
 from .plain_data import Drawn, jfsm_version, plain_gain, plain_record
 from .sentences import difference_sentence, verdict_advice, verdict_sentence
 from .unfinished import Unfinished
@@ -46,14 +49,17 @@ class Tested(NamedTuple):
 
 
 class Reached(NamedTuple):
-    """The decision, the trial that it rests on, the law that was named, if one was, all the evidence, and the force
-    that the named causes leave, if that is not negligible."""
+    """The decision, the trial that it rests on, the law that was named, if one was, all the evidence, the force that
+    the named causes leave, if that is not negligible, how a force was assumed to go between its samples, and how late
+    forces are, by channel, with the 95 % interval [s]."""
 
     decision: Decision
     winner: Trial
     term: AbstractTerm | None
     evidence: Evidence
-    rest: Residual | None = None
+    rest: Residual | None
+    assumed: Reconstruction
+    late: Lateness
 
     def ranked(self, trials: list[Trial]) -> Ranked:
         """The decision with the hypotheses behind it."""
@@ -77,17 +83,20 @@ def assemble(
     decision, unfinished, model, records = reached.decision, tested.unfinished, problem.model, problem.records
     first, verdict = records[0], decision.verdict
     units, imposed = first.record.units, first.path is not None
-    findings = findings_of(reached.ranked(tested.trials), reached.winner, clipped, model, missing, first)
+    late = late_forces(reached.late, first, reached.evidence.setting)
+    findings = (*findings_of(reached.ranked(tested.trials), reached.winner, clipped, model, missing, first), *late)
     candidates = tuple(_candidates(tested, decision, refitted, model, units))
     winner = reached.winner if decision.winner != GIVEN else refitted
     refit = refitted_values(winner, model, units)
     between = [] if verdict == "consistent" else differences(winner)
     differ = [difference_sentence(one, unit_of(winner.structure, one.path, units)) for one in between]
-    notes = tuple(dict.fromkeys(_notes(unfinished, problem, differ, winner, gain)))
+    said = times_of_forces(reached.late, first, reached.assumed)
+    notes = tuple(dict.fromkeys([*_notes(unfinished, problem, differ, winner, gain), *said]))
     smallest = smallest_effects(tested.seen, units)
     shape = _shape(missing if verdict in ("undecided", "unnamed") else reached.rest)
     drawn = Drawn(missing, runs, reached.term, first.record, first.period, with_shape=verdict != "consistent")
     sentence = verdict_sentence(decision, reached.winner, findings, gain, shape, differ, imposed=imposed)
+    sentence = beside_late_forces(sentence, verdict, late)
     advice = verdict_advice(decision, gain, imposed=imposed)
     told = {
         "jfsm": jfsm_version(),

@@ -8,7 +8,8 @@ import jax
 import numpy as np
 
 from ..._limit import Limit
-from ...structures import ChannelDelay
+from ...structures import ChannelDelay, ForceDelay
+from ..channels.clock import in_its_time
 from ..channels.coloured_noise import coloured
 from ..channels.delays import gain_of_delay, seems_late, slightly_late
 from ..channels.drift import SLOWLY, wandering
@@ -67,7 +68,8 @@ class Rounds:
     pairs: bool
 
     def run(self) -> tuple[Searched, Problem | None]:
-        """What was found; and the problem to search in instead, where a channel drifts or its noise is coloured."""
+        """What was found; and the problem to search in instead, where the force acts late, a channel drifts or its
+        noise is coloured."""
         found, left_out = self._single_effects()
         found = self._related(found)
         refitted = refit_from(found.trials, self.refitted, self.problem)
@@ -76,12 +78,14 @@ class Rounds:
         if self._limit.over:
             return singles, None
         best = self._likeliest(singles.every)
-        other = self._with_other_noise(best)
+        other = self._with_other_times(singles.every) or self._with_other_noise(best)
         effects = self._second_effects(singles) if self.pairs and other is None else []
         if not effects:
             return singles, other
         both = self._pairs(effects, best, singles, louder)
-        return both, None if self._limit.over else coloured(self._likeliest(both.every), self.problem)
+        if self._limit.over:
+            return both, None
+        return both, self._with_other_times(both.every) or coloured(self._likeliest(both.every), self.problem)
 
     @property
     def _limit(self) -> Limit:
@@ -168,6 +172,11 @@ class Rounds:
             found = search_known(self.known, found, self.problem, tell)
         return found
 
+    def _with_other_times(self, trials: Sequence[Trial]) -> Problem | None:
+        """The problem with the force at the times at which it turns out to act beside the best that has no delay."""
+        timely = [t for t in trials if not any(isinstance(part, ForceDelay | ChannelDelay) for part in t.parts)]
+        return in_its_time(self._likeliest(timely), self.problem, to_noise=False)
+
     def _with_other_noise(self, best: Trial) -> Problem | None:
         """The problem with the noise that a channel turns out to have beside the best; None where none has."""
         other = coloured(best, self.problem)  # noise that remembers is in part slow as well
@@ -219,7 +228,7 @@ class Rounds:
         if other is None:
             return None
         found = search_beside(best, other, sensor, self.problem, self.steps.of("what is late"))
-        slight = slightly_late(found.trials, {}, self.problem.first.record.dt)
+        slight = slightly_late(found.trials, {}, self.problem.first.record)
         return found if slight and settled(found.trials) else None
 
 

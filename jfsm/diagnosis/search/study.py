@@ -11,7 +11,8 @@ from ..._limit import Limit
 from ...identification import prepare_all
 from ...plant import Reconstruction
 from ...records import Record
-from ...structures import Cause, Structure
+from ...structures import AttachedOscillator, Cause, DelayedForce, Maxwell, Structure
+from ..channels.clock import WAYS, in_its_time
 from ..channels.drift import PLAINLY, steadied, wandering
 from ..evidence.between_records import differ
 from ..evidence.excess import white
@@ -24,12 +25,14 @@ from ..hypotheses.parametrisation import Apart
 from ..thresholds import THRESHOLDS
 from .baseline import believed, refit_from
 from .rounds import Rounds, Searched, amid_noise
-from .searches import search_again
+from .searches import search, search_again
 from .segments import pieces
 from .steps import Steps
 
 _AS_LIKELY = 3.0
 """Nats by which trials are apart, at most, of which none is likelier than the other."""
+_LAGGING = AttachedOscillator, DelayedForce, Maxwell
+"""Laws that are linear but for their memory: in some motions they look like a force that is late."""
 
 Studied = tuple[Problem, list[Candidate], Searched]
 """What was fitted to, what could be tried, and what was found."""
@@ -42,11 +45,16 @@ class Study:
     model: Structure
     chosen: dict[str, Cause]
     places: Sequence[tuple[int, int]] | None
-    reconstruction: Reconstruction
+    reconstruction: Reconstruction | None
     key: jax.Array
     steps: Steps
     limit: Limit
     pairs: bool
+
+    @property
+    def ways(self) -> tuple[Reconstruction, ...]:
+        """Those in which a force may go between its samples, what is assumed first."""
+        return WAYS if self.reconstruction is None else (self.reconstruction,)
 
     def of(
         self, training: Sequence[tuple[Record, int]], *, unless_later: bool = False, known: Trial | None = None
@@ -82,7 +90,7 @@ class Study:
         part, every, ahead = self._sought(*believed(self._problem(parts)), known)
         if self.limit.over:
             return part, every, ahead
-        problem, given, refitted = believed(problem.knowing(part), near=ahead.refitted)
+        problem, given, refitted = believed(problem.as_timed(part).knowing(part), near=ahead.refitted)
         found = self._fitted_again(ahead, given, refitted, problem)
         if self.limit.over:
             return part, every, ahead
@@ -93,21 +101,28 @@ class Study:
     def _problem(self, training: Sequence[tuple[Record, int]]) -> Problem:
         """Records, and how much of each is fitted, as the likelihood sees them."""
         records, until = [whole for whole, _ in training], [fit for _, fit in training]
-        prepared = prepare_all(records, self.model, self.reconstruction)
-        return Problem(self.model, prepared, until, limit=self.limit)
+        prepared = prepare_all(records, self.model, self.ways[0])
+        return Problem(self.model, prepared, until, limit=self.limit, ways=self.ways)
 
     def _sought(self, problem: Problem, given: Trial, refitted: Trial, known: Trial | None) -> Studied:
-        """What could be tried, and what was found; channels may turn out to drift, or their noise to be coloured.
+        """What could be tried, and what was found; the force may turn out to act late, channels to drift, or their
+        noise to be coloured.
 
         Where the time is over before that is known, what was found first is the answer.
         """
         self.limit.found()
         if self.limit.over:
             return problem, [], Searched(given, refitted, [], [], [], LackOfFit(problem))
+        other = in_its_time(refitted, problem, to_noise=True)
+        if other is not None:
+            late = self._sought_with(other, problem, given, refitted, known)
+            if not self._lags(late, problem, given, refitted):
+                return late
+            return self._sought(problem._replace(ways=()), given, refitted, known)
         channel = wandering(refitted, problem, PLAINLY)
         if channel is not None:
             return self._sought_with(problem.with_wandering(channel), problem, given, refitted, known)
-        every = candidates(self.model, [steadied(n) for n in problem.records], self.chosen, self.places)
+        every = self._candidates(problem)
         rounds = Rounds(every, given, refitted, known, problem, self.steps, self.key, self.pairs)
         found, other = rounds.run()
         if other is None or self.limit.over:
@@ -115,11 +130,28 @@ class Study:
         studied = self._sought_with(other, problem, given, refitted, known)
         return (problem, every, found) if self.limit.over else studied
 
+    def _candidates(self, problem: Problem) -> list[Candidate]:
+        """What could be tried: not the delay of a force of which it is known."""
+        every = candidates(self.model, [steadied(n) for n in problem.records], self.chosen, self.places)
+        known = {("force_delay", channel) for channel in problem.first.late}
+        return [c for c in every if (c.effects[0].cause.id, c.effects[0].at) not in known]
+
+    def _lags(self, late: Studied, problem: Problem, given: Trial, refitted: Trial) -> bool:
+        """Whether a law by which the structure lags is likelier than a late force, beside which nothing was found."""
+        best = max(late[2].every, key=lambda t: t.evidence)
+        if best.effects or self.limit.over:
+            return False
+        lagging = [c for c in self._candidates(problem) if c.starts and c.effects[0].cause.effect in _LAGGING]
+        if not lagging:
+            return False
+        tried = search(lagging, given, refitted, problem, self.steps.of("laws that lag like a late force"))
+        return any(t.evidence > best.evidence for t in tried.trials)
+
     def _sought_with(
         self, other: Problem, problem: Problem, given: Trial, refitted: Trial, known: Trial | None
     ) -> Studied:
-        """What is found with another noise of the channels. What the model lacks may have looked like that: then it
-        holds as well without."""
+        """What is found with another noise of the channels, or the force at another time. What the model lacks may have
+        looked like that: then it holds as well without."""
         other, every, found = self._sought(*believed(other, near=refitted), known)
         best = max(found.every, key=lambda t: t.evidence)
         if best.effects and not self.limit.over:

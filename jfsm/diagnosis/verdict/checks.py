@@ -55,6 +55,14 @@ CHECKS: Mapping[str, Kind] = {
         "limits",
         "No channel is cut off at a limit of its recorder.",
     ),
+    "acts_in_time": Kind(
+        "sensors",
+        "<=",
+        "share of the signal",
+        "If a force acts later than it was recorded, or is held between its samples, a run of the model as given "
+        "hardly changes by it. If it does, that is a cause, also where nothing else is wrong.",
+        ("negligible",),
+    ),
     "better_than_given": Kind(
         "detected",
         ">=",

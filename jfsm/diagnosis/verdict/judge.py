@@ -22,6 +22,7 @@ from .checks import checked
 from .confirmed import MOST_NEAR, confirm, stays_in_step
 from .decision import MODEL, Decision
 from .judgement import decided
+from .late_forces import beside_late_forces
 from .right_shape import WRONG_SHAPE
 
 
@@ -31,6 +32,11 @@ def judge(evidence: Evidence, limits: Thresholds = THRESHOLDS) -> Decision:
     It is reached anew where predictions over some periods make the model consistent and a run over all held-out
     readings does not.
     """
+    return beside_late_forces(_judged(evidence, limits), evidence.setting, limits)
+
+
+def _judged(evidence: Evidence, limits: Thresholds) -> Decision:
+    """The verdict on all but the times of the forces."""
     decision = _concluded(evidence, limits, long_run=False)
     row = stays_in_step(evidence_behind(decision, evidence), limits) if decision.verdict == "consistent" else None
     if row is None:
