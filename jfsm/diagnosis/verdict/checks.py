@@ -278,7 +278,7 @@ CHECKS: Mapping[str, Kind] = {
         ">=",
         "share of held-out error",
         "A law that is not quite of the right shape closes nearly all of the held-out error; its class is named then.",
-        ("almost_all",),
+        ("nearly_all",),
     ),
 }
 """In the order of the stages."""

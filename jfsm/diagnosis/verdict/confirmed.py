@@ -50,7 +50,7 @@ def confirm(decision: Decision, evidence: Evidence, limits: Thresholds, *, long_
 
 def _of_its_class(decision: Decision, hearing: "_Hearing") -> Decision | None:
     """The decision with the first of the laws that are near named that runs over held-out readings confirm."""
-    bench, least = hearing.bench, hearing.bench.limits.almost_all
+    bench, least = hearing.bench, hearing.bench.limits.nearly_all
     for near in decision.near[:MOST_NEAR]:
         errors = bench.evidence.held_out(near)
         if errors is None:

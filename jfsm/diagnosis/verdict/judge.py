@@ -103,7 +103,7 @@ def _may_be_one_of_two(decision: Decision, evidence: Evidence, limits: Threshold
     if decision.verdict != "undecided" or not refused:
         return False
     errors = (evidence.held_out(near) for near in decision.near[:MOST_NEAR])
-    return not any(one is not None and one.closed >= limits.almost_all for one in errors)
+    return not any(one is not None and one.closed >= limits.nearly_all for one in errors)
 
 
 def _same_in_all_records(decision: Decision, evidence: Evidence, limits: Thresholds) -> Decision:
