@@ -15,7 +15,14 @@ ALIKE = (
 
 
 def is_inverted(force: Samples, motion: Samples, derivative: int, dt: float, frequency: float) -> bool:
-    """Whether a force looks like that on a negative mass and a negative stiffness.
+    """Whether a force looks like that on a negative mass and a negative stiffness; arguments as in `polarity`."""
+    return polarity(force, motion, derivative, dt, frequency) < -ERRORS
+
+
+def polarity(force: Samples, motion: Samples, derivative: int, dt: float, frequency: float) -> float:
+    """Standard errors by which the mass or the stiffness that a force seems to move is above zero, whichever is more.
+
+    It is far below zero where both are negative, and 0 where the two cannot be told apart.
 
     Parameters
     ----------
@@ -49,12 +56,12 @@ def is_inverted(force: Samples, motion: Samples, derivative: int, dt: float, fre
     columns /= np.linalg.norm(columns, axis=0)
     normal = columns.T @ columns
     if abs(normal[0, 2]) > ALIKE:
-        return False
+        return 0.0
     mass, _, stiffness = found = np.linalg.solve(normal, columns.T @ target)
     left = target - columns @ found
     variance = CORRELATED * (left @ left) / target.size
     errors = np.sqrt(variance * np.diag(np.linalg.inv(normal)))
-    return bool(mass < -ERRORS * errors[0] and stiffness < -ERRORS * errors[2])
+    return float(max(mass / errors[0], stiffness / errors[2]))
 
 
 def _real(y: Spectra) -> Samples:

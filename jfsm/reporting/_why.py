@@ -35,11 +35,11 @@ def decisive_checks(d: Dictionary) -> list[Dictionary]:
     """
     decision = d.get("decision") or {}
     stopped = decision.get("stopped_by")
-    about = {MODEL, decision.get("winner", "").removesuffix(MAP), *_clipped(decision)}
+    about = {MODEL, decision.get("winner", "").removesuffix(MAP), *_looked_at(decision)}
     if stopped is not None:
         about.add(stopped["of"])
     last = {(row["name"], row["of"]): row for row in decision.get("checks") or () if row["of"] in about}
-    rows = [row for row in last.values() if row != stopped]
+    rows = [row for row in last.values() if row != stopped and not (row["stage"] == "sensors" and row["passed"])]
     rows.sort(key=lambda row: (row["of"] != MODEL, row["of"]))
     return [*rows, *([stopped] if stopped is not None else [])]
 
@@ -159,11 +159,14 @@ def _causes(key: str) -> list[str]:
     return [part.split("@")[0] for part in key.removesuffix(MAP).split("+") if "@" in part]
 
 
-def _clipped(decision: Dictionary) -> set[str]:
-    return {row["of"] for row in decision.get("checks") or () if row["stage"] == "sensors"}
+def _looked_at(decision: Dictionary) -> set[str]:
+    """Channels that a look showed something of."""
+    return {row["of"] for row in decision.get("checks") or () if row["stage"] == "sensors" and not row["passed"]}
 
 
 def _effect_name(part: str) -> str:
+    if "@" not in part:  # a channel, or the record
+        return part
     cause, _, place = part.partition("@")
     if ":" in place:
         kind, j = place.split(":")
