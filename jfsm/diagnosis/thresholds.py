@@ -40,6 +40,14 @@ class Thresholds:
     unit_near: float = _number(
         0.05, "log of a ratio", "The same of the small factors, which a wrong value may be as well.", _BLIND
     )
+    opposed: float = _number(
+        -0.7, "cosine", "Phase between a motion and the model's, below which they oppose each other.",
+        "three quarters of a right angle from opposite",
+    )  # fmt: skip
+    opposed_power: float = _number(
+        -5.0, "standard errors", "Mean power of a force at its own point, below which it takes energy out.",
+        "one in a million by chance",
+    )  # fmt: skip
     in_place: float = _number(
         0.05, "share of the power", "What two channels leave in each other's place, at most, for them to be swapped.",
         _BLIND,

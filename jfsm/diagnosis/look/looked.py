@@ -7,12 +7,12 @@ from ..._result import Check
 from ...plant import check_pair
 from ...records import Look, Record, look, mended, rest_words
 from ...structures import AccelerationGain, ForceGain, Structure
-from .sizes import sizes
+from .sizes import beside_model
 
 STOPS = ("channel_moves", "scales_agree", "right_size", "channels_in_place")
 """Looks that nothing can be fitted after: the record, or a unit, has to be put right first."""
 
-SIGNS = ("signs_agree", "takes_energy", "pushes_forward")
+SIGNS = ("signs_agree", "takes_energy", "pushes_forward", "follows_model")
 """Looks that tell a wrong sign."""
 MENDED = {"force": ForceGain, "acceleration": AccelerationGain}
 """Sensors' laws that turn the sign of a kind of channel, with this gain error:"""
@@ -65,9 +65,12 @@ def looked_at(records: Sequence[Record], model: Structure) -> Looked:
     checks = [check for one in looks for check in one.checks]
     _stop_at(checks, records)
     _stop_at_motion(inverted, checks)
-    checks += (size for record in sound for size in sizes(record, model))
-    _stop_at(checks, records)
-    return Looked(sound, tuple(checks), inverted)
+    asked = [check for record in sound for check in beside_model(record, model)]
+    _stop_at(asked, records)
+    opposed = {("force", int(one.of.split()[1])) for one in asked if one.name == "follows_model" and not one.passed}
+    opposed = tuple(sorted(opposed - set(inverted)))
+    sound = [_turned(record, opposed) for record in sound]
+    return Looked(sound, (*checks, *asked), (*inverted, *opposed))
 
 
 def held_out_alike(records: Sequence[Record], looked: Looked) -> list[Record]:

@@ -47,6 +47,14 @@ CHECKS: Mapping[str, Kind] = {
         "shape is the model's, or it is a thousand times as large.",
         ("unit_thousand", "unit_large", "unit_about", "unit_follows", "unit_alike", "unit_near"),
     ),
+    "follows_model": Kind(
+        "sensors",
+        ">",
+        "cosine",
+        "The motion of a driven point does not oppose what the model as given makes of the force, while that takes "
+        "energy out of it.",
+        ("opposed", "opposed_power"),
+    ),
     "channels_in_place": Kind(
         "sensors",
         ">=",
