@@ -13,7 +13,10 @@ from jfsm.diagnosis.thresholds import THRESHOLDS
 from jfsm.diagnosis.verdict.checks import CHECKS
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-VERDICT = Path(__file__).resolve().parents[1] / "jfsm" / "diagnosis" / "verdict"
+PACKAGE = Path(__file__).resolve().parents[1] / "jfsm"
+# Where checks are made; those that the record alone tells are in a file of its room.
+MADE_IN = (*(PACKAGE / "diagnosis" / "verdict").glob("*.py"), *(PACKAGE / "diagnosis" / "look").glob("*.py"))
+ALONE = PACKAGE / "records" / "_look.py"
 
 
 def test_the_page_is_what_the_code_says():
@@ -25,7 +28,7 @@ def test_the_page_is_what_the_code_says():
 
 
 def test_every_check_is_made_somewhere_and_its_limits_are_thresholds():
-    code = "\n".join(path.read_text(encoding="utf-8") for path in VERDICT.glob("*.py") if path.name != "checks.py")
+    code = "\n".join(path.read_text(encoding="utf-8") for path in (*MADE_IN, ALONE) if path.name != "checks.py")
     made = set(re.findall(r'check(?:ed)?\(\s*"(\w+)"', code))
     assert made == set(CHECKS)
     assert {limit for kind in CHECKS.values() for limit in kind.limits} == set(THRESHOLDS.explained())

@@ -142,9 +142,7 @@ def _diagnosed(
     """What `diagnose` returns, within the limit."""
     key = jax.random.key(secrets.randbits(32)) if key is None else key
     looked = looked_at(given, model)
-    record: Sequence[Record] = looked.records
-    if holdout is not None and not isinstance(holdout, int | float):
-        holdout = held_out_alike(records_of(holdout), looked)
+    record, holdout = looked.records, held_out_alike(holdout, looked)
     training, _ = split(record, holdout)
     chosen = chosen_causes(causes)
     whole = [whole for whole, _ in training]

@@ -8,13 +8,15 @@ from numpy.typing import NDArray
 
 from jfsm.records._abstract_record import AbstractRecord
 from jfsm.records._core import core_std
-from jfsm.records._noise_floor import noise_floor
+from jfsm.records._noise_floor import SHORTEST, noise_floor
 from jfsm.records._quantisation import quantisation_step
 
 BLOCKS = 50  # pieces of a record whose power is compared with that of noise
+PARTS = 8  # of the last piece that moves, by which the beginning of rest is known
 LOUD = 2.0  # power of a piece, in those of noise, from which something moves
 LEAST = 0.05  # share of a record that is always used
 CREEP = 0.02  # share of a channel's extent that it may creep by, all in all, where nothing moves
+TURNS, SURE = 2, 4.0  # times that a creep turns back, at most; standard errors of a step that tells
 LONG = 0.2  # share of a driven record, from which rest is left out: a pause is a part of a test
 
 
@@ -78,21 +80,48 @@ def _loud_until(y: NDArray[np.float64], noise: float) -> int:
     if not loud:
         return 0
     last = _before_creep(y, blocks, noise, loud[-1])
-    return int(blocks[last][-1]) + 1
+    end = int(blocks[last][-1]) + 1
+    return end if last == loud[-1] else end - _still_at_the_end(y[blocks[last]], noise)
 
 
 def _before_creep(y: NDArray[np.float64], blocks: list[NDArray[np.int64]], noise: float, last: int) -> int:
-    """The last block that is more than noise about a slow creep, which the rest of the channel follows."""
+    """The last block that is more than noise about a slow creep, which the rest of the channel follows.
+
+    A creep turns back twice at most: what does so more often still swings.
+    """
     most, low, high, quiet = CREEP * float(np.ptp(y)), np.inf, -np.inf, len(blocks) - 1
+    way, turns, after = 0.0, 0, float(np.mean(y[blocks[-1]]))
     for k in range(len(blocks) - 1, 0, -1):
         own = y[blocks[k]]
-        place = np.linspace(-1.0, 1.0, own.size)
-        mean, slope = float(np.mean(own)), float(place @ own / (place @ place))
+        mean, slope, left = _line(own)
         low, high = min(low, mean - abs(slope)), max(high, mean + abs(slope))
-        if np.mean((own - mean - slope * place) ** 2) > LOUD * noise**2 or high - low > most:
+        step = mean - after
+        if abs(step) > SURE * noise * np.sqrt(2.0 / own.size):
+            turns, way, after = turns + (step * way < 0), np.sign(step), mean
+        if turns > TURNS:
+            return last
+        if left > LOUD * noise**2 or high - low > most:
             break
         quiet = k - 1
     return quiet if len(blocks) - 1 - quiet >= LONG * len(blocks) else last
+
+
+def _line(y: NDArray[np.float64]) -> tuple[float, float, float]:
+    """Mean of a piece, the half of its rise, and what a straight line leaves of it in mean square."""
+    place = np.linspace(-1.0, 1.0, y.size)
+    mean, slope = float(np.mean(y)), float(place @ y / (place @ place))
+    return mean, slope, float(np.mean((y - mean - slope * place) ** 2))
+
+
+def _still_at_the_end(y: NDArray[np.float64], noise: float) -> int:
+    """Samples at the end of a piece that show no more than noise about a line."""
+    parts = np.array_split(y, max(1, min(PARTS, y.size // SHORTEST)))
+    still = 0
+    for part in parts[::-1]:
+        if _line(part)[2] > LOUD * noise**2:
+            break
+        still += part.size
+    return still
 
 
 def _released(channels: list[tuple[NDArray[np.float64], float]], begin: int) -> int:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 from ..._result import Check
 from ...plant import check_pair
@@ -60,22 +61,31 @@ def looked_at(records: Sequence[Record], model: Structure) -> Looked:
     for record in records:
         check_pair(model, record, imposed=True)
     looks = [look(record) for record in records]
-    inverted = tuple(dict.fromkeys(channel for one in looks for channel in one.inverted))
-    sound = [_sound(record, one, inverted) for record, one in zip(records, looks, strict=True)]
-    checks = [check for one in looks for check in one.checks]
+    checks = tuple(chain.from_iterable(one.checks for one in looks))
+    inverted = tuple(dict.fromkeys(chain.from_iterable(one.inverted for one in looks)))
     _stop_at(checks, records)
     _stop_at_motion(inverted, checks)
-    asked = [check for record in sound for check in beside_model(record, model)]
+    sound = [_sound(record, one, inverted) for record, one in zip(records, looks, strict=True)]
+    asked = tuple(chain.from_iterable(beside_model(record, model) for record in sound))
     _stop_at(asked, records)
-    opposed = {("force", int(one.of.split()[1])) for one in asked if one.name == "follows_model" and not one.passed}
-    opposed = tuple(sorted(opposed - set(inverted)))
-    sound = [_turned(record, opposed) for record in sound]
-    return Looked(sound, (*checks, *asked), (*inverted, *opposed))
+    opposed = _opposed(asked)
+    return Looked([_turned(record, opposed) for record in sound], (*checks, *asked), (*inverted, *opposed))
 
 
-def held_out_alike(records: Sequence[Record], looked: Looked) -> list[Record]:
-    """Held-out records, mended and turned as the fitted ones."""
-    return [_turned(mended(record), looked.inverted) for record in records]
+def _opposed(checks: Sequence[Check]) -> tuple[tuple[str, int], ...]:
+    """Forces that the model shows to have the wrong sign."""
+    found = (check.of for check in checks if check.name == "follows_model" and not check.passed)
+    return tuple(dict.fromkeys(("force", int(name.split()[1])) for name in found))
+
+
+def held_out_alike(
+    holdout: float | Record | Sequence[Record] | None, looked: Looked
+) -> float | Sequence[Record] | None:
+    """Held-out records, mended and turned as the fitted ones; a share, or None, as it is."""
+    if holdout is None or isinstance(holdout, int | float):
+        return holdout
+    held = [holdout] if isinstance(holdout, Record) else list(holdout)
+    return [_turned(mended(record), looked.inverted) for record in held]
 
 
 def _stop_at(checks: Sequence[Check], records: Sequence[Record]) -> None:

@@ -19,7 +19,14 @@ def beside(decision: Decision, looked: Looked) -> Decision:
     return replace(decision, verdict=verdict, checks=(*looked.checks, *decision.checks), stopped_by=stopped)
 
 
-def sign_findings(looked: Looked) -> tuple[Finding, ...]:
+def with_signs(findings: tuple[Finding, ...], verdict: str, looked: Looked) -> tuple[Finding, ...]:
+    """The findings of a verdict, channels of the wrong sign first; own values are no findings beside them."""
+    if not looked.inverted:
+        return findings
+    return (*_sign_findings(looked), *(findings if verdict == "cause" else ()))
+
+
+def _sign_findings(looked: Looked) -> tuple[Finding, ...]:
     """Channels of the wrong sign as findings: a gain error of −2 turns a sign."""
     found = []
     for kind, j in looked.inverted:

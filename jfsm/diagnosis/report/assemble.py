@@ -20,7 +20,7 @@ from ..evidence.scorecard import GIVEN
 from ..evidence.setup import Problem
 from ..hypotheses.candidate import Candidate
 from ..look.looked import Looked
-from ..look.told import beside, sign_findings, told
+from ..look.told import beside, told, with_signs
 from ..search.batches import LeftBehind
 from ..verdict.decision import Decision
 from .estimates import Units, noise_by_channel, refitted_values, smallest_effects, unit_of
@@ -85,8 +85,7 @@ def assemble(
     sentence = verdict_sentence(decision, reached.winner, findings, gain, shape, differ, imposed=imposed)
     sentence, advice = told(sentence, looked, verdict_advice(decision, gain, imposed=imposed))
     decision = beside(decision, looked)
-    if looked.inverted:
-        findings = (*sign_findings(looked), *(findings if verdict == "cause" else ()))
+    findings = with_signs(findings, verdict, looked)
     data = {
         "jfsm": jfsm_version(),
         "verdict": decision.verdict,
