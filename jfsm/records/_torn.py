@@ -38,7 +38,11 @@ def far_outside(kind: str, y: NDArray[np.float64]) -> NDArray[np.bool_]:
     if y.size < SHORTEST:
         return mask
     distance = np.abs(y - np.median(y))
-    order = np.argsort(distance)[::-1][: max(FEWEST, int(MOST * y.size)) + 1]
+    most = max(FEWEST, int(MOST * y.size)) + 1
+    least = float(np.partition(distance, y.size - most)[y.size - most])
+    if distance.max() <= min(FAR_CODE, FAR_JUMPING) * least:
+        return mask  # as in most channels
+    order = np.argsort(distance)[::-1][:most]
     far = FAR.get(kind, FAR_JUMPING)
     codes = _is_code(y[order])
     candidates = np.zeros(y.size, dtype=bool)

@@ -12,7 +12,7 @@ from ...structures import Structure
 from ..thresholds import THRESHOLDS
 from ..verdict.checks import checked
 from .signs import force_signs
-from .spectra import PIECES, Ratio, Spectra, made, pieces_of, ratio_of
+from .spectra import PIECES, Ratio, Spectra, lowest_mode, made, pieces_of, ratio_of
 
 
 def beside_model(record: Record, model: Structure) -> Iterator[Check]:
@@ -27,7 +27,8 @@ def beside_model(record: Record, model: Structure) -> Iterator[Check]:
         return
     pieces = pieces_of(record)
     spectra = made(record, model, pieces)
-    found = {channel: ratio_of(*pair) for channel, pair in spectra.items()}
+    mode = lowest_mode(model)
+    found = {channel: ratio_of(*pair, pieces.omega, mode) for channel, pair in spectra.items()}
     ratios = {channel: ratio for channel, ratio in found.items() if ratio is not None}
     for channel, ratio in ratios.items():
         check = _size_check(record, channel, ratio)
@@ -42,13 +43,14 @@ def tolerance(ratio: Ratio, known: UnitFactor, *, imposed: bool) -> float | None
     """How far a ratio may be from a factor between units, as a logarithm, and be that factor; None where its shape says
     that the model is wrong instead, or says nothing."""
     limits, cosine = THRESHOLDS, abs(ratio.cosine)
-    thousands = known.size >= limits.unit_thousand and ratio.times > 1.0 and cosine > limits.unit_follows
-    if thousands and not imposed:  # nothing but a unit makes a motion so much larger than a model has it
-        return limits.unit_about
-    if known.size >= limits.unit_large:
-        same = ratio.spread < limits.unit_alike and cosine > 1.0 - limits.unit_alike
+    same = ratio.spread < limits.unit_alike and cosine > 1.0 - limits.unit_alike
+    if known.size >= limits.unit_thousand and ratio.times > 1.0 and ratio.wide:
+        # Nothing but a unit makes a motion so much larger than a model has it, whatever its shape.
+        return limits.unit_about if cosine > limits.unit_follows else None
+    if known.size >= limits.unit_thousand or (known.size >= limits.unit_large and (ratio.wide or imposed)):
         return limits.unit_alike if same else None
-    return limits.unit_near if ratio.spread < limits.unit_near and cosine > 1.0 - limits.unit_near else None
+    near = ratio.spread < limits.unit_near and cosine > 1.0 - limits.unit_near
+    return limits.unit_near if near and ratio.wide else None
 
 
 def _size_check(record: Record, channel: Channel, ratio: Ratio) -> Check | None:

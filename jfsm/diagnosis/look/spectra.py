@@ -10,7 +10,7 @@ from ...records import Pieces, Record, rough_noise, strongest_frequency
 from ...structures import Structure
 from .linear_run import driven_run
 
-PIECES = 8
+PIECES = 6
 _LEAST_LINES = 3
 _AWAY = 3
 """Lines next to zero that a constant reaches through the taper."""
@@ -18,19 +18,23 @@ _CLEAR = 50.0
 """Power over noise from which a line takes part."""
 _COHERENT = 0.5
 """Coherence over the pieces from which a line tells a ratio."""
+_BESIDE = 1.4
+"""Times below and above a mode from which a line lies beside it."""
 _LONGEST = 2000
 """Samples of a piece, at most,"""
-_PERIODS = 4
+_PERIODS = 8
 """and periods of the strongest frequency in it."""
 
 
 class Ratio(NamedTuple):
     """A channel over what the model makes of it: by how many times, the spread of that over the lines of the spectrum
-    as a logarithm, and the cosine of the phase between them."""
+    as a logarithm, the cosine of the phase between them, and whether the lines lie on both sides of the model's lowest
+    mode, so that stiffness and mass both show."""
 
     times: float
     spread: float
     cosine: float
+    wide: bool
 
 
 Spectra = Mapping[Channel, tuple[np.ndarray, np.ndarray]]
@@ -83,8 +87,11 @@ def _needed(record: Record, model: Structure, pieces: Pieces) -> dict[Channel, n
     return {(kind, j): np.asarray(needed)[j - 1] for kind, j in record.channels if kind == "force"}
 
 
-def ratio_of(seen: np.ndarray, expected: np.ndarray) -> Ratio | None:
-    """The ratio of spectra (pieces, lines) over lines that are coherent; None where too few are."""
+def ratio_of(seen: np.ndarray, expected: np.ndarray, omega: np.ndarray, mode: float) -> Ratio | None:
+    """The ratio of spectra (pieces, lines) over lines `omega` [rad/s] that are coherent; None where too few are.
+
+    `mode` is the lowest natural frequency of the model [rad/s].
+    """
     power, own = np.sum(np.abs(expected) ** 2, 0), np.sum(np.abs(seen) ** 2, 0)
     many = np.sum(np.abs(seen) > 0, 0) >= PIECES // 2
     used = (power > 0) & (own > 0) & many
@@ -98,4 +105,16 @@ def ratio_of(seen: np.ndarray, expected: np.ndarray) -> Ratio | None:
     ratio = cross[told] / power[used][told]
     size = np.log(np.abs(ratio))
     low, middle, high = np.quantile(size, [0.25, 0.5, 0.75])
-    return Ratio(float(np.exp(middle)), float(high - low) / 1.35, float(np.median(ratio.real / np.abs(ratio))))
+    lines = omega[used][told]
+    wide = bool(lines.min() < mode / _BESIDE and lines.max() > mode * _BESIDE)
+    return Ratio(float(np.exp(middle)), float(high - low) / 1.35, float(np.median(ratio.real / np.abs(ratio))), wide)
+
+
+def lowest_mode(model: Structure) -> float:
+    """The lowest natural frequency of the linear part [rad/s]; 0 without one."""
+    plant = numbers_of(model)
+    mass, stiffness = np.asarray(plant.mass), np.asarray(plant.stiffness)
+    if np.linalg.matrix_rank(mass) < len(mass):
+        return 0.0
+    squares = np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real
+    return float(np.sqrt(max(np.min(squares), 0.0)))
