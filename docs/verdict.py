@@ -15,6 +15,7 @@ from jfsm.diagnosis.verdict.checks import CHECKS, STAGES  # noqa: E402
 
 PAGE = Path(__file__).with_suffix(".md")
 CODE = Path(__file__).resolve().parents[1] / "jfsm" / "diagnosis" / "verdict"
+RECORDS = CODE.parents[1] / "records"
 
 HEAD = """# How a verdict is reached
 
@@ -187,7 +188,7 @@ def _code(words: Iterable[str]) -> str:
 def made_in() -> dict[str, list[str]]:
     """Of every check the functions that make it, each with its file, from the code."""
     made: dict[str, list[str]] = {}
-    for path in sorted(CODE.glob("*.py")):
+    for path in sorted([*CODE.glob("*.py"), *(CODE.parent / "look").glob("*.py"), RECORDS / "_look.py"]):
         functions = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef)]
         for function in functions:
             for name in filter(None, map(_name_of_check, ast.walk(function))):
@@ -197,9 +198,12 @@ def made_in() -> dict[str, list[str]]:
 
 def _name_of_check(node: ast.AST) -> str | None:
     """The name of the check that a call makes."""
-    if not (isinstance(node, ast.Call) and ast.unparse(node.func).split(".")[-1] in ("check", "_check", "checked")):
+    if not (
+        isinstance(node, ast.Call)
+        and ast.unparse(node.func).split(".")[-1] in ("check", "_check", "checked", "_checked")
+    ):
         return None
-    return next((one.value for one in node.args[:1] if isinstance(one, ast.Constant)), None)
+    return next((str(one.value) for one in node.args[:1] if isinstance(one, ast.Constant)), None)
 
 
 def _thresholds() -> Iterator[str]:

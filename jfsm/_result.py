@@ -1,7 +1,8 @@
-"""Outcomes of a calculation: how it ended, and values with their intervals."""
+"""Outcomes of a calculation: how it ended, values with their intervals, and comparisons with a limit."""
 
 import enum
 from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 
 class Result(enum.Enum):
@@ -27,3 +28,20 @@ class Estimate:
     low: float
     high: float
     unit: str
+
+
+Relation = Literal[">=", "<=", ">", "<"]
+
+
+class Check(NamedTuple):
+    """One comparison: what was measured of which channel or hypothesis, the limit, and the outcome."""
+
+    stage: str
+    name: str
+    of: str
+    measured: float
+    relation: Relation
+    threshold: float
+    unit: str
+    passed: bool
+    says: str

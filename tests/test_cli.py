@@ -110,6 +110,15 @@ def test_a_record_is_inspected_in_the_units_that_are_given(channels):
     assert "displacement 1" in flat(result.stdout) or "displac" in result.stdout
 
 
+def test_of_a_record_the_part_between_two_instants_is_read(channels):
+    result = run("inspect", *channels, "--since", 1.0, "--until", 3.0)
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert "500 samples" not in result.stdout and "are kept, t = 1 to 3 s" in flat(result.stdout)
+    result = run("inspect", *channels, "--since", 1000.0)
+    assert result.exit_code == 2
+    assert "`since` and `until` must keep at least 2 samples" in flat(result.stderr)
+
+
 def test_an_inspection_is_written_as_a_page(channels, tmp_path):
     result = run("inspect", *channels, "--report", tmp_path / "page.html")
     assert (result.exit_code, result.stderr) == (0, "")

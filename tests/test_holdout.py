@@ -39,7 +39,25 @@ def test_a_driven_structure_begins_anew_where_it_was_held_out_or_is_led_there(le
     assert led.time[0] == T[begins]
 
 
+def test_the_first_part_of_the_motion_is_held_out_and_rest_is_not_fitted():
+    record = released(1.0)
+    _, (last,) = split(record, 0.25)
+    ((fitted, until),), (held,) = split(record, 0.25, first=True)
+    moving = len(last.record)
+    assert moving < 1500 and len(held.record) == round(0.25 * moving)
+    assert until == moving - len(held.record) < len(fitted)
+
+
+def test_rest_is_neither_fitted_nor_held_out_where_nothing_is_kept_back_or_another_record_is():
+    record = released(1.0)
+    _, (last,) = split(record, 0.25)
+    ((_, until),), held = split(record, None)
+    assert (until, held) == (len(last.record), [])
+    _, (other,) = split(record, record)
+    assert len(other.record) == len(last.record)
+
+
 def test_the_first_part_held_out_is_not_seen():
-    ((fitted, until),), (held,) = split(released(1.0), 0.25, first=True)
+    ((fitted, until),), (held,) = split(released(0.0), 0.25, first=True)
     assert (len(fitted), until, len(held.record), held.begin) == (1500, 1500, 500, 0)
     assert "shows in the last part only" in fitted.notes[-1]

@@ -69,6 +69,8 @@ class _Channels:
     at_rest: Annotated[
         bool, typer.Option("--at-rest", help="At rest at the first sample.", rich_help_panel=CHANNELS)
     ] = False
+    since: Annotated[float | None, option("Leave out what the record shows before.", "SECONDS", CHANNELS)] = None
+    until: Annotated[float | None, option("Leave out what the record shows after.", "SECONDS", CHANNELS)] = None
     drive: Annotated[
         str | None, option("What is imposed: force, or motion (a component on a rig).", "force|motion", CHANNELS)
     ] = None
@@ -112,7 +114,7 @@ class RecordFile(_Channels):
 
     def read(self) -> "Record":
         """The record in the file."""
-        return self.read_file(self.record)
+        return self.read_file(self.record).between(self.since, self.until)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +125,7 @@ class RecordFiles(_Channels):
 
     def read(self) -> "list[Record]":
         """The records in the files."""
-        return [self.read_file(path) for path in self.records]
+        return [self.read_file(path).between(self.since, self.until) for path in self.records]
 
     def held_out(self, given: Sequence[str] | None) -> "float | list[Record] | None":
         """A share, nothing, or the records in other files."""

@@ -22,9 +22,11 @@ from .evidence.fitted import Trial
 from .evidence.measured import HeldOutRuns, Weighed
 from .evidence.missing_force import Residual, residual
 from .evidence.setup import Problem
-from .evidence.split import HeldOut, split
+from .evidence.split import HeldOut, records_of, split
 from .hypotheses.candidate import Candidate
 from .hypotheses.candidates import chosen_causes
+from .look.looked import held_out_alike, looked_at
+from .look.told import mended_model
 from .report.assemble import Reached, Tested, assemble
 from .report.sentences import leaves_something
 from .report.unfinished import Unfinished
@@ -46,6 +48,8 @@ def diagnose(
     max_causes: int = 2,
     key: jax.Array | None = None,
     *,
+    since: float | None = None,
+    until: float | None = None,
     places: Sequence[tuple[int, int]] | None = None,
     reconstruction: Reconstruction | None = None,
     time_limit: float | None = None,
@@ -57,6 +61,11 @@ def diagnose(
     only a late force is looked for then: a gain of the force is that of all own values. A response channel that is late
     by less than a sample is no finding: it is put in time, and the verdict is that of the rest. A force that is late,
     or held between its samples, is a finding where that changes a run of `model` as given.
+
+    Before anything is fitted the records are looked at. Torn and hung samples take no part, and neither does rest, and
+    notes say so. A force or an acceleration of the wrong sign is a cause; it is turned, and the verdict on the rest
+    follows. A dead channel, a displacement or a velocity of the wrong sign, and a size that is off by a factor between
+    units are refused.
 
     Parameters
     ----------
@@ -76,6 +85,8 @@ def diagnose(
         two are not.
     key : jax.random.key, optional
         Source of the few draws (the floor of the gain); made at the call when None.
+    since, until : float, optional
+        Instants [s] of the records' own clocks between which they are used, held-out ones aside.
     places : sequence of links, optional
         Where laws and loads are tried; by default laws on the model's links, loads on every mass.
     reconstruction : "band-limited", "linear" or "hold", optional
@@ -96,7 +107,8 @@ def diagnose(
     Raises
     ------
     ValueError
-        If the record cannot be used, does not fit the model, or an argument is out of its range.
+        If the record cannot be used, does not fit the model, or an argument is out of its range; a look before the
+        first fit may refuse it.
     KeyboardInterrupt
         If it is interrupted before the model itself was fitted, or for the second time.
 
@@ -112,13 +124,14 @@ def diagnose(
     if time_limit is not None and not time_limit > 0:
         raise ValueError(f"`time_limit` must be positive, in seconds; got {time_limit:g}. Without it there is none.")
     limit = Limit(time_limit)
+    records = [part.between(since, until) for part in records_of(record)]
     with shown_by_default(progress) as told, ended_by_interrupt(limit):
-        arguments = record, model, holdout, causes, max_causes, key, places, reconstruction
+        arguments = records, model, holdout, causes, max_causes, key, places, reconstruction
         return _diagnosed(*arguments, limit, Steps(told, 4))
 
 
 def _diagnosed(
-    record: Record | Sequence[Record],
+    given: Sequence[Record],
     model: Structure,
     holdout: float | Record | Sequence[Record] | None,
     causes: Sequence[str | Cause] | None,
@@ -131,6 +144,8 @@ def _diagnosed(
 ) -> Diagnosis:
     """What `diagnose` returns, within the limit."""
     key = jax.random.key(secrets.randbits(32)) if key is None else key
+    looked = looked_at(given, model)
+    record, holdout = looked.records, held_out_alike(holdout, looked)
     training, _ = split(record, holdout)
     chosen = chosen_causes(causes)
     whole = [whole for whole, _ in training]
@@ -157,12 +172,13 @@ def _diagnosed(
     rest = residual(winner.structure, steadied(first), fitted) if leaves_something(decision, winner) else None
     steps.next("what would have been seen")
     seen = _would_have_been_seen(decision.verdict, every, tried, judged)
+    extended = mended_model(extended, looked)
     unfinished = Unfinished.of(chosen, tried, limit, cut=not decision.finished, pairs=study.pairs)
     tested = Tested(tried.trials, tried.behind, tried.left_out, seen, tried.lack.known, unfinished)
     leading = Leading.of(model, [refitted, *tried.trials], lambda t: decision.probability(t.key), first, fitted)
     steps.end()
     reached = Reached(decision, winner, term, weighed.evidence, rest, assumed, late_forces)
-    return assemble(reached, clipped, refitted, tested, judged, extended, missing, gain, runs, leading)
+    return assemble(reached, clipped, refitted, tested, judged, extended, missing, gain, runs, leading, looked)
 
 
 def _stands_for(term: AbstractTerm | None, winner: Trial, refitted: Trial, problem: Problem) -> Residual:

@@ -20,6 +20,43 @@ def _number(default: float, unit: str, means: str, source: str) -> Any:
 class Thresholds:
     """The numbers behind a verdict; `explained()` gives unit, meaning and source of each."""
 
+    unit_thousand: float = _number(
+        500.0, "ratio", "Factors between units from here on are believed of a motion far larger than the model has it, "
+        "whatever its shape.", "no value of a model that anybody believes in is so far off",
+    )  # fmt: skip
+    unit_large: float = _number(
+        30.0, "ratio", "Factors between units from here on need not be met to a few per cent.",
+        "no calibration and hardly a value is so far off",
+    )  # fmt: skip
+    unit_about: float = _number(
+        1.2, "log of a ratio", "Distance from a factor of a thousand at which it is that factor.",
+        "a factor of 3.3: what friction, or a resonance, makes of a size",
+    )  # fmt: skip
+    unit_follows: float = _number(
+        0.3, "cosine", "Phase that a motion a thousand times too large keeps with the model's, at least.", _BLIND
+    )
+    unit_alike: float = _number(
+        0.2, "log of a ratio", "Spread over frequencies, distance from a large factor, and what the phase's cosine may "
+        "lack of one, for it to be that factor.", "values that are off by a fifth",
+    )  # fmt: skip
+    unit_near: float = _number(
+        0.05, "log of a ratio", "The same of the small factors, which a wrong value may be as well.", _BLIND
+    )
+    opposed: float = _number(
+        -0.7, "cosine", "Phase between a motion and the model's, below which they oppose each other.",
+        "three quarters of a right angle from opposite",
+    )  # fmt: skip
+    opposed_power: float = _number(
+        -5.0, "standard errors", "Mean power of a force at its own point, below which it takes energy out.",
+        "one in a million by chance",
+    )  # fmt: skip
+    in_place: float = _number(
+        0.05, "share of the power", "What two channels leave in each other's place, at most, for them to be swapped.",
+        _BLIND,
+    )  # fmt: skip
+    swapped: float = _number(
+        0.1, "ratio", "That, in what they leave where they stand, below which they are swapped.", _BLIND
+    )
     significant: float = _number(
         5.0, "nats", "Gain in log-evidence of one hypothesis over another that was named beforehand.",
         "R. E. Kass, A. E. Raftery, J. Am. Stat. Assoc. 90 (1995) 773, table in 3.2: above 5 is very strong evidence",

@@ -41,7 +41,7 @@ from ..plant import (
     typical_size,
     undelayed,
 )
-from ..records import Record
+from ..records import Record, mended
 from ..structures import (
     AbstractFriction,
     AbstractSensor,
@@ -219,6 +219,7 @@ def simulate(
     require_x64()
     check_scheme(solver, tolerance)
     check_pair(model, record, imposed=True)
+    record = mended(record)
     model = with_tables(model)
     if record.drive == "motion":
         if initial_state is not None:

@@ -16,7 +16,7 @@ from jaxtyping import Float
 from .._programs import programs_kept
 from .._types import require_x64
 from ..plant import check_pair, direction, lower
-from ..records import Record
+from ..records import Record, mended
 from ..structures import LinearDamping, LinearStiffness, Structure
 from ._learning import Learned, learned, smoothed
 from ._missing import less_known
@@ -126,6 +126,7 @@ def estimate_motion(
         )
     if len(record) < _SHORTEST:
         raise ValueError(f"`record` must hold at least {_SHORTEST} samples; it has {len(record)}.")
+    record = mended(record)
     if model is not None:
         return _with_model(record, model, places)
     if places is not None:

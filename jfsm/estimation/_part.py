@@ -94,6 +94,8 @@ class Part:
         noise = np.array([max(floor.std, low) for floor, low in zip(floors, least, strict=True)])
         spiky = np.column_stack([spikes(y, s) for y, s in zip(seen.T, noise, strict=True)])
         use = np.column_stack([~clipped(y, torn) for y, torn in zip(seen.T, spiky.T, strict=True)]) & ~spiky
+        for i, channel in enumerate(channels):
+            use[:, i] &= ~record.lost.get(channel, np.zeros(len(record), dtype=bool))
         absolute = orders == 2  # an accelerometer shows the base's motion as well
         acts = np.std(force, 0) > 0
         size = np.std(force, 0)[acts]

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from .._programs import programs_kept
 from .._types import as_scalar, require_x64
 from ..plant import direction
-from ..records import Record
+from ..records import Record, mended
 from ..structures import Structure
 from ._motion import estimate_motion
 from ._observable import Place
@@ -77,6 +77,7 @@ def restoring_force(
             "`model` or `mass` must be given, and not both: a force is g - m a. Give the mass for all of the link's "
             "force, or the model for what it lacks."
         )
+    record = mended(record)
     if model is None:
         return _whole(record, mass, at)
     if at is None:

@@ -1,6 +1,7 @@
 """What channels tell before anything is fitted: their noise, which of their samples are readings, and what drives."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -8,7 +9,18 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from ..plant import Channel, force_limits, measured_force
-from ..records import NoiseFloor, Record, bridged, clipped, declipped, defects, noise_floor, spikes, tones
+from ..records import (
+    NoiseFloor,
+    Record,
+    bridged,
+    clipped,
+    declipped,
+    defects,
+    is_constant,
+    noise_floor,
+    spikes,
+    tones,
+)
 from ..structures import Structure
 
 LEAST_NOISE = 1e-4
@@ -22,6 +34,10 @@ _SAME = 1e-9
 """Rounding, relative."""
 _STRETCH = 0.25
 """Share of a channel's samples, one after the other, that are enough to read its noise from."""
+
+
+Lost = Mapping[tuple[str, int], np.ndarray]
+"""Samples (n,) that are no readings, by channel."""
 
 
 class ChannelReadings(NamedTuple):
@@ -57,8 +73,10 @@ class Forces(NamedTuple):
     in_motion: Float[np.ndarray, " dof"]
 
 
-def readings_of(channels: tuple[Channel, ...], values: Float[np.ndarray, "n channels"], dt: float) -> ChannelReadings:
-    """Readings (n, channels) as a likelihood sees them."""
+def readings_of(
+    channels: tuple[Channel, ...], values: Float[np.ndarray, "n channels"], dt: float, bridged_at: Lost
+) -> ChannelReadings:
+    """Readings (n, channels) as a likelihood sees them; those that were bridged take no part."""
     use, floor, trusted = np.ones_like(values), np.zeros(len(channels)), np.zeros(len(channels), dtype=bool)
     values, spread, notes = values.copy(), spread_of(channels, values), []
     for i, (kind, j) in enumerate(channels):
@@ -69,6 +87,7 @@ def readings_of(channels: tuple[Channel, ...], values: Float[np.ndarray, "n chan
         floor[i] = max(std, LEAST_NOISE * spread[i])
         torn = spikes(values[:, i], floor[i])
         lost = cut | torn
+        use[bridged_at.get((kind, j), ~np.ones_like(lost)), i] = 0.0  # noted when they were bridged
         values[:, i] = bridged(values[:, i], torn)
         if np.any(lost):
             use[lost, i] = 0.0
@@ -95,9 +114,12 @@ def _noise_floor(samples: np.ndarray, cut: np.ndarray, dt: float) -> NoiseFloor:
 def spread_of(channels: tuple[Channel, ...], values: Float[np.ndarray, "n channels"]) -> Float[np.ndarray, " channels"]:
     """Standard deviation of each channel; a dead one is refused."""
     spread = np.std(values, axis=0)
-    for (kind, j), size in zip(channels, spread, strict=True):
-        if size == 0:
-            raise ValueError(f"`{kind}` {j} is constant; leave a dead channel out of the record.")
+    for (kind, j), y in zip(channels, values.T, strict=True):
+        if is_constant(y):
+            raise ValueError(
+                f"`{kind}` {j} is constant ({y[0]:.4g}): nothing was measured there. Leave a dead channel out of the "
+                f"record."
+            )
     return spread
 
 

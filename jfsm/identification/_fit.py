@@ -12,7 +12,7 @@ from .._result import Result
 from .._threads import side_by_side
 from .._types import require_x64
 from ..plant import Reconstruction
-from ..records import Record
+from ..records import Record, mended
 from ..structures import Offset, Structure, is_offset
 from ._maximise import Maximum, approach, finish
 from ._missing_links import missing_links, words_of
@@ -79,6 +79,8 @@ def fit(
     fixed: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
     *,
+    since: float | None = None,
+    until: float | None = None,
     reconstruction: Reconstruction = "band-limited",
 ) -> Fit:
     """Most probable values of a structure's numbers, with intervals.
@@ -97,6 +99,8 @@ def fit(
         Numbers that stay, e.g. ``("mass", "stiffness@0-1.k")``.
     bounds : mapping of path or kind to (low, high), optional
         In the unit of the number.
+    since, until : float, optional
+        Instants [s] of the records' own clocks between which they are used.
 
     Returns
     -------
@@ -111,6 +115,7 @@ def fit(
     records = [record] if isinstance(record, Record) else list(record)
     if not records:
         raise ValueError("`record` must hold at least one record; the sequence is empty.")
+    records = [mended(part.between(since, until)) for part in records]
     prepared = prepare_all(records, model, reconstruction)
     free = free_paths(model, prepared, fixed)
     held = {path: value for path, value in model.values().items() if path not in free}

@@ -321,7 +321,7 @@ def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "
     if record.drive == "motion":
         return _prepare_imposed(record, model, reconstruction)
     channels = tuple(record.responses)
-    seen = readings_of(channels, np.column_stack([record.responses[c] for c in channels]), record.dt)
+    seen = readings_of(channels, np.column_stack([record.responses[c] for c in channels]), record.dt, record.lost)
     values, floor, spread = seen.values, seen.floor, np.std(seen.values, axis=0)
     force, words = forces(record, model)
     base = None if record.base_acceleration is None else driving(record.base_acceleration, record.dt)
@@ -391,7 +391,7 @@ def _prepare_imposed(record: Record, model: Structure, reconstruction: Reconstru
             lost = clipped(values[:, i])
             # A force that stays at its extremes for most of the time is dry friction, not the end of a range.
             lost = (lost & (np.mean(lost) < _MOSTLY)) | spikes(values[:, i], floor[i])
-            use[:, i] = ~lost
+            use[:, i] = ~(lost | record.lost.get((kind, j), np.zeros_like(lost)))
             if np.any(lost):
                 notes.append(f"force {j}: {int(lost.sum())} clipped or torn samples take no part.")
     nearest = [i for i, (kind, _) in enumerate(channels) if kind != "force"][0]

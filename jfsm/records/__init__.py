@@ -1,6 +1,7 @@
 """What was measured: records, their files, their units and their noise."""
 
 from jfsm.records._advance import advanced as advanced
+from jfsm.records._checks import strongest_frequency as strongest_frequency
 from jfsm.records._combine import align as align
 from jfsm.records._combine import join as join
 from jfsm.records._declip import declipped as declipped
@@ -8,11 +9,23 @@ from jfsm.records._defects import bridged as bridged
 from jfsm.records._defects import clipped as clipped
 from jfsm.records._defects import defects as defects
 from jfsm.records._defects import spikes as spikes
+from jfsm.records._look import LOOKS as LOOKS
+from jfsm.records._look import Look as Look
+from jfsm.records._look import is_constant as is_constant
+from jfsm.records._look import look as look
+from jfsm.records._mended import mended as mended
 from jfsm.records._noise_floor import NoiseFloor as NoiseFloor
 from jfsm.records._noise_floor import noise_floor as noise_floor
 from jfsm.records._quantisation import quantisation_step as quantisation_step
 from jfsm.records._read import read as read
 from jfsm.records._record import Record as Record
+from jfsm.records._rest import rest_words as rest_words
+from jfsm.records._rest import rough_noise as rough_noise
+from jfsm.records._rest import span_of_motion as span_of_motion
 from jfsm.records._rolloff import rolloff as rolloff
 from jfsm.records._silence import silent_forces as silent_forces
+from jfsm.records._tapers import Pieces as Pieces
 from jfsm.records._tones import tones as tones
+from jfsm.records._unit_factors import UnitFactor as UnitFactor
+from jfsm.records._unit_factors import likely_unit as likely_unit
+from jfsm.records._unit_factors import miss as miss

@@ -13,6 +13,7 @@ from jfsm.records._resample import resampled
 from jfsm.records._units import KINDS, coherent_units, find_unit
 
 Channel = NDArray[np.float64]
+Lost = NDArray[np.bool_]
 ChannelArgument = ArrayLike | Mapping[int, ArrayLike] | None
 Drive = Literal["force", "motion"]
 
@@ -51,6 +52,7 @@ class AbstractRecord:
         self._time = as_time(time, factors.pop("time", 1.0))
         stated.pop("time", None)
         self._units = dict(coherent_units(stated))
+        self._stated = frozenset(stated)
         given = {"force": force, "displacement": displacement, "velocity": velocity, "acceleration": acceleration}
         self._columns: dict[str, Columns] = {
             kind: as_columns(kind, samples, self._time, factors.get(kind, 1.0))
@@ -65,6 +67,7 @@ class AbstractRecord:
         self._drive: Drive = drive
         self._name = name
         self._notes: tuple[str, ...] = ()
+        self._lost: dict[tuple[str, int], Lost] = {}
 
     @property
     def time(self) -> Channel:
@@ -125,6 +128,11 @@ class AbstractRecord:
         return MappingProxyType(self._units)
 
     @property
+    def stated(self) -> frozenset[str]:
+        """Kinds of channel whose unit was stated; that of the others was assumed."""
+        return self._stated
+
+    @property
     def dofs(self) -> int:
         """Highest dof that a channel mentions, 0 without channels."""
         return max((dofs[-1] for dofs, _ in self._columns.values()), default=0)
@@ -157,6 +165,14 @@ class AbstractRecord:
         if not NOTED < jitter <= UNEVEN:
             return self._notes
         return (*self._notes, f"Time steps differ by up to {jitter:.2%}; they are treated as uniform.")
+
+    @property
+    def lost(self) -> Mapping[tuple[str, int], Lost]:
+        """(n,) samples that are no readings, by channel (kind, dof); channels without any are left out.
+
+        Those that a mended record bridges; `inspect` names what else may be none.
+        """
+        return MappingProxyType(self._lost)
 
     @property
     def dt(self) -> float:
@@ -224,6 +240,7 @@ class AbstractRecord:
         base = None if self._base_acceleration is None else self._base_acceleration[start:stop]
         time = self._time[start:stop]
         part = self._with(time, columns, base, at_rest=self._at_rest and start == 0)
+        part._lost = _where_any({key: lost[start:stop] for key, lost in self._lost.items()})
         if len(part) == len(self):
             return part
         return part.noted(
@@ -237,6 +254,25 @@ class AbstractRecord:
     def since(self, time: float) -> Self:
         """The part from this instant [s] on, itself included; notes and errors as of a slice."""
         return self[int(np.searchsorted(self._time, time, side="left")) :]
+
+    def between(self, since: float | None = None, until: float | None = None) -> Self:
+        """The part from one instant [s] to another, both included, or from the beginning, or to the end.
+
+        Raises
+        ------
+        ValueError
+            If fewer than two samples lie between them.
+        """
+        if since is None and until is None:
+            return self
+        first = 0 if since is None else int(np.searchsorted(self._time, since, side="left"))
+        last = len(self) if until is None else int(np.searchsorted(self._time, until, side="right"))
+        if last - first < 2:
+            raise ValueError(
+                f"`since` and `until` must keep at least 2 samples of a record from {self._time[0]:.6g} to "
+                f"{self._time[-1]:.6g} s; they were {since} and {until}. Give instants of its own clock, in seconds."
+            )
+        return self[first:last]
 
     def shifted(self, seconds: float) -> Self:
         """The same samples on a clock that reads so many seconds [s] more, or less if negative, with a note.
@@ -303,6 +339,37 @@ class AbstractRecord:
         other._notes = tuple(dict.fromkeys((*self._notes, *notes)))
         return other
 
+    def with_lost(
+        self,
+        bridged: Mapping[tuple[str, int], Channel],
+        lost: Mapping[tuple[str, int], Lost],
+        base: Channel | None = None,
+    ) -> Self:
+        """The same record, these channels `bridged` where samples are `lost`, which take no part in any fit."""
+        channels = self.channels
+        columns = {
+            kind: (dofs, frozen(np.array([bridged.get((kind, j), channels[kind, j]) for j in dofs]).T))
+            for kind, (dofs, _) in self._columns.items()
+        }
+        other = self._with(
+            self._time, columns, self._base_acceleration if base is None else base, at_rest=self._at_rest
+        )
+        other._lost = _where_any({**self._lost, **lost})
+        return other
+
+    def turned(self, channel: tuple[str, int]) -> Self:
+        """The record with the sign of one channel (kind, dof) turned, with a note.
+
+        Raises
+        ------
+        ValueError
+            If the record has no such channel.
+        """
+        if channel not in self.channels:
+            raise ValueError(f"`channel` names {channel}; the record has {', '.join(map(str, self.channels))}.")
+        other = self.with_lost({channel: -self.channels[channel]}, {})
+        return other.noted(f"The sign of {channel[0]} {channel[1]} was turned.")
+
     def _samples(self, kind: str) -> Channel | None:
         return self._columns[kind][1] if kind in self._columns else None
 
@@ -325,14 +392,23 @@ class AbstractRecord:
             for (kind, (dofs, _)), part in zip(self._columns.items(), parts, strict=False)
         }
         base = None if self._base_acceleration is None else frozen(parts[-1][:, 0].copy())
-        return self.noted(*self.notes)._with(frozen(time), columns, base, at_rest=self._at_rest), note
+        other = self.noted(*self.notes)._with(frozen(time), columns, base, at_rest=self._at_rest)
+        nearest = np.clip(np.searchsorted(self._time, time), 0, len(self) - 1)
+        beside = np.maximum(nearest - 1, 0)
+        other._lost = _where_any({key: lost[nearest] | lost[beside] for key, lost in self._lost.items()})
+        return other, note
 
     def _with(self, time: Channel, columns: dict[str, Columns], base: Channel | None, at_rest: bool) -> Self:
         """The same test with other samples, which are trusted."""
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
         other._time, other._columns, other._base_acceleration, other._at_rest = time, columns, base, at_rest
+        other._lost = self._lost if time.size == self._time.size else {}
         return other
+
+
+def _where_any(lost: Mapping[tuple[str, int], Lost]) -> dict[tuple[str, int], Lost]:
+    return {key: mask for key, mask in lost.items() if np.any(mask)}
 
 
 AnyRecord = TypeVar("AnyRecord", bound=AbstractRecord)

@@ -1,11 +1,12 @@
 """What a record is given, checked and brought into one shape: columns of finite doubles, one for each measured dof."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+Samples = TypeVar("Samples", NDArray[np.float64], NDArray[np.bool_])
 Columns = tuple[tuple[int, ...], NDArray[np.float64]]
 
 
@@ -84,7 +85,7 @@ def as_single(kind: str, given: Any, time: NDArray[np.float64], factor: float) -
     return frozen(samples)
 
 
-def frozen(array: NDArray[np.float64]) -> NDArray[np.float64]:
+def frozen(array: Samples) -> Samples:
     """The array itself, made read-only."""
     array.flags.writeable = False
     return array

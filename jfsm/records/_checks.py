@@ -163,8 +163,9 @@ def amplitude_coverage(y: Samples) -> float:
 
 def _of_samples(summary: ChannelSummary, raw: Samples) -> Iterator[Finding]:
     channel, unit, std, n = summary.channel, summary.unit, summary.std, raw.size
-    if std == 0:
-        yield Finding("warning", channel, f"Constant at {summary.mean:.4g} {unit}. Leave a dead channel out.")
+    if np.ptp(raw) == 0:
+        if channel.startswith(("force", "base")):  # of a response the look before says it
+            yield Finding("info", channel, f"Constant at {summary.mean:.4g} {unit}: a load that does not change.")
         return
     if summary.clipped:
         yield Finding(
@@ -203,7 +204,7 @@ def _of_spikes(
 
 def _of_level(summary: ChannelSummary) -> Iterator[Finding]:
     channel, unit, std = summary.channel, summary.unit, summary.std
-    if std == 0:
+    if summary.minimum == summary.maximum:
         return
     offset, error, drift, drift_error = summary.level or (summary.mean, 0.0, 0.0, 0.0)
     if abs(offset) > max(OFFSET_SHARE * std, LEVEL_ERRORS * error):
@@ -222,7 +223,7 @@ def _of_noise(summary: ChannelSummary, floor: NoiseFloor | None) -> Iterator[Fin
     if floor is None:
         yield Finding("info", channel, f"Fewer than {SHORTEST} samples: the noise cannot be told.")
         return
-    if summary.std == 0:
+    if summary.minimum == summary.maximum:
         return
     if floor.silent:
         yield Finding("info", channel, f"Noise only, {floor.std:.3g} {unit}, or too fast to be told from it.")

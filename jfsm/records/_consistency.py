@@ -51,13 +51,14 @@ def of_comparisons(
         )
         yield Finding("warning", pair.upper, message)
     pairs = [pair for pair in pairs if pair.agreement >= FOLLOWS]
-    yield from _of_polarity(pairs)
+    yield from of_polarity(pairs)
     yield from _of_gain(pairs)
     yield from _of_delay(pairs, dt)
     yield from _of_offset(pairs, summaries)
 
 
-def _of_polarity(pairs: Sequence[Comparison]) -> Iterator[Finding]:
+def of_polarity(pairs: Sequence[Comparison]) -> Iterator[Finding]:
+    """The channel of the wrong sign where three were measured; failing that, the two that differ."""
     yield from _of_excess(
         pairs,
         [(1.0 if pair.inverted else 0.0, 0.0) for pair in pairs],

@@ -27,3 +27,8 @@ def share(value: float) -> str:
     if value < 1e-4:
         return "less than 0.01%"
     return f"{value:.2%}" if value < 0.01 else f"{value:.1%}"
+
+
+def capitalised(sentence: str) -> str:
+    """The first letter large, the others as they are."""
+    return sentence[:1].upper() + sentence[1:]

@@ -1,6 +1,6 @@
 """The first page of an examination: is this record what its owner thinks it is?"""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,12 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
+from jfsm._result import Check
 from jfsm.records._abstract_record import AbstractRecord
 from jfsm.records._checks import ChannelSummary, Finding, examine
 from jfsm.records._coherence import Coherence, coherence
 from jfsm.records._comparison import Comparison, Reading
 from jfsm.records._consistency import KINDS, comparisons, of_comparisons
-from jfsm.records._figures import plus_minus
+from jfsm.records._figures import capitalised, plus_minus
+from jfsm.records._look import look
+from jfsm.records._mended import mended
 from jfsm.records._noise_floor import SHORTEST, noise_floor
 from jfsm.records._noise_spectrum import NoiseSpectrum, noise_spectrum
 from jfsm.records._periods import Periods, average
@@ -28,6 +31,15 @@ from jfsm.records._trace import Trace
 GAP, LONG_GAP = 1.5, 3.5  # median steps: from here on samples are missing; more than two in a row
 COHERENT = 0.9  # mean coherence below which it is worth a word
 SLOW = 0.1  # of the velocity's standard deviation: below, a point is about to turn
+SHOWN_LOOKS = {  # those that no other finding tells, and how serious they are
+    "channel_moves": "warning",
+    "no_torn_samples": "warning",
+    "no_hung_samples": "warning",
+    "moves_throughout": "info",
+    "scales_agree": "warning",
+    "takes_energy": "warning",
+    "drive_measured": "info",
+}
 DISTURBED = 2.0  # times the noise above the signal, that periods differ by
 
 
@@ -47,6 +59,9 @@ class Inspection:
         Figures of each channel.
     findings : tuple of Finding
         (severity, channel, message); severity is "info" or "warning".
+    checks : tuple of Check
+        What was looked at before anything else, each with its number, its limit and the outcome; `diagnose` does the
+        same.
     comparisons : tuple of Comparison
         Displacement, velocity and acceleration of each point against one another.
     spectra : tuple of Spectrum
@@ -75,6 +90,7 @@ class Inspection:
     findings: tuple[Finding, ...]
     time: NDArray[np.float64]
     traces: tuple[Trace, ...]
+    checks: tuple[Check, ...] = ()
     drives: tuple[str, ...] = ()
     gaps: tuple[tuple[float, float], ...] = ()
     comparisons: tuple[Comparison, ...] = ()
@@ -120,6 +136,9 @@ def inspect(record: AbstractRecord) -> Inspection:
     except ValueError:  # said already
         uniform = record.resample(1.0 / float(np.median(np.diff(record.time))))
         dt = uniform.dt
+    checks = look(uniform).checks
+    findings.extend(_of_looks(checks))
+    record, uniform = mended(record), mended(uniform)
 
     traces: list[Trace] = []
     summaries: dict[str, ChannelSummary] = {}
@@ -138,7 +157,7 @@ def inspect(record: AbstractRecord) -> Inspection:
         if floor is None or np.ptp(y) == 0:
             continue
         lost = (traces[-1] if uniform is record else Trace.of(channel, unit, y, floor)).lost
-        readings[channel] = Reading(channel, y, floor.std, lost)
+        readings[channel] = Reading(channel, y, floor.std, lost | _left_out(uniform, channel))
         spectra.append(spectrum(channel, y, dt))
         if floor.std > 0:
             noise.append(noise_spectrum(channel, y, floor))
@@ -147,7 +166,7 @@ def inspect(record: AbstractRecord) -> Inspection:
     findings.extend(_of_copies(readings))
 
     silent = _silent(uniform, summaries)
-    findings.extend(_of_the_test(uniform, silent))
+    findings.extend(_of_the_test(uniform, silent, checks))
     pairs, found = _of_points(uniform, readings, summaries, silent, dt)
     findings.extend(found)
     drives, responses = _causes_and_effects(uniform, readings, silent)
@@ -166,6 +185,7 @@ def inspect(record: AbstractRecord) -> Inspection:
         findings=_sorted(findings, list(summaries)),
         time=record.time,
         traces=tuple(traces),
+        checks=checks,
         drives=tuple(drives),
         gaps=gaps,
         comparisons=pairs,
@@ -182,6 +202,12 @@ def _every_channel(record: AbstractRecord) -> dict[str, tuple[str, np.ndarray]]:
     if record.base_acceleration is not None:
         shown["base_acceleration"] = (record.units["base_acceleration"], record.base_acceleration)
     return shown
+
+
+def _left_out(record: AbstractRecord, channel: str) -> NDArray[np.bool_]:
+    """Samples of a channel that were bridged."""
+    kind, _, dof = channel.partition(" ")
+    return record.lost.get((kind, int(dof or 0)), np.zeros(len(record), dtype=bool))
 
 
 def _gaps(time: NDArray[np.float64]) -> Iterator[tuple[float, float]]:
@@ -233,7 +259,15 @@ def _silent(record: AbstractRecord, summaries: Mapping[str, ChannelSummary]) -> 
     )
 
 
-def _of_the_test(record: AbstractRecord, silent: tuple[int, ...]) -> Iterator[Finding]:
+def _of_looks(checks: Iterable[Check]) -> Iterator[Finding]:
+    """What a look shows, in its own words."""
+    for check in checks:
+        if not check.passed and check.name in SHOWN_LOOKS:
+            severity = "info" if SHOWN_LOOKS[check.name] == "info" else "warning"
+            yield Finding(severity, check.of, f"{capitalised(check.says)}.")
+
+
+def _of_the_test(record: AbstractRecord, silent: tuple[int, ...], checks: Iterable[Check]) -> Iterator[Finding]:
     """What the channels together say of the kind of test."""
     forces = [dof for kind, dof in record.channels if kind == "force"]
     for dof in silent:
@@ -241,7 +275,10 @@ def _of_the_test(record: AbstractRecord, silent: tuple[int, ...]) -> Iterator[Fi
     if not record.responses and record.drive == "force":
         yield Finding("warning", "record", "No response was measured: nothing can be compared with a model.")
     if len(silent) == len(forces) and record.base_acceleration is None:
-        yield Finding("info", "record", "No force acts: the record is a free decay.")
+        decays = {check.passed for check in checks if check.name == "drive_measured"}
+        words = {True: "No force acts: the record is a free decay."}
+        if False not in decays:
+            yield Finding("info", "record", words.get(True in decays, "No force was measured."))
 
 
 def _of_copies(readings: Mapping[str, Reading]) -> Iterator[Finding]:

@@ -7,6 +7,7 @@ from jfsm.records._tapers import SHORTEST_PIECE, Pieces, Samples, Spectra
 
 PERIODS, FEWEST_PIECES = 8, 6
 PEAK = 0.01  # share of the strongest line's power from which a line belongs to the resonance
+PUSHED = 1e-3  # the same of the force
 ERRORS = 6.0
 CORRELATED = 4.0  # pieces overlap by half, and the taper ties neighbouring lines together
 ALIKE = (
@@ -15,7 +16,14 @@ ALIKE = (
 
 
 def is_inverted(force: Samples, motion: Samples, derivative: int, dt: float, frequency: float) -> bool:
-    """Whether a force looks like that on a negative mass and a negative stiffness.
+    """Whether a force looks like that on a negative mass and a negative stiffness; arguments as in `polarity`."""
+    return polarity(force, motion, derivative, dt, frequency) < -ERRORS
+
+
+def polarity(force: Samples, motion: Samples, derivative: int, dt: float, frequency: float) -> float:
+    """Standard errors by which the mass or the stiffness that a force seems to move is above zero, whichever is more.
+
+    It is far below zero where both are negative, and 0 where the two cannot be told apart.
 
     Parameters
     ----------
@@ -40,21 +48,25 @@ def is_inverted(force: Samples, motion: Samples, derivative: int, dt: float, fre
     length = int(np.clip(round(PERIODS / (frequency * dt)), SHORTEST_PIECE, 2 * force.size // (FEWEST_PIECES + 1)))
     pieces = Pieces.of(force.size, length, dt)
     x, v, a = (pieces.spectra(motion - motion.mean(), order) for order in range(3))
-    strength = np.mean(np.abs(v) ** 2, axis=0)
-    strength[:3] = 0.0
-    peak = strength > PEAK * strength.max()
+    pushes = pieces.spectra(force - force.mean())
+    strength, pushed = (np.mean(np.abs(y) ** 2, axis=0) for y in (v, pushes))
+    strength[:3] = pushed[:3] = 0.0
+    # What moves without being pushed, as the harmonics that a nonlinear spring makes, tells nothing.
+    peak = (strength > PEAK * strength.max()) & (pushed > PUSHED * pushed.max())
     flat = 1.0 / np.sqrt(strength[peak])  # so that the flanks, which tell mass from stiffness, count as the peak does
     columns = np.stack([_real(flat * y[:, peak]) for y in (a, v, x)], axis=1)
-    target = _real(flat * pieces.spectra(force - force.mean())[:, peak])
+    target = _real(flat * pushes[:, peak])
     columns /= np.linalg.norm(columns, axis=0)
     normal = columns.T @ columns
     if abs(normal[0, 2]) > ALIKE:
-        return False
-    mass, _, stiffness = found = np.linalg.solve(normal, columns.T @ target)
+        return 0.0
+    mass, damping, stiffness = found = np.linalg.solve(normal, columns.T @ target)
     left = target - columns @ found
     variance = CORRELATED * (left @ left) / target.size
     errors = np.sqrt(variance * np.diag(np.linalg.inv(normal)))
-    return bool(mass < -ERRORS * errors[0] and stiffness < -ERRORS * errors[2])
+    if damping > ERRORS * errors[1]:  # it takes energy, as with the right sign: a single line bends the other two
+        return 0.0
+    return float(max(mass / errors[0], stiffness / errors[2]))
 
 
 def _real(y: Spectra) -> Samples:

@@ -10,6 +10,7 @@ from jfsm.records._quantisation import quantisation_step
 from jfsm.records._tapers import Samples
 
 HELD = 5  # equal samples in a row, within the record, that no continuous channel has
+HELD_TO_THE_END = 20  # the same at its end
 RAREST, TOGETHER, CHANCE = 1e-5, 3.0, 0.05  # share of equal neighbours at least; how far they cluster; a hang by chance
 GENTLE = 0.1  # of the usual step, and of a velocity's standard deviation: beside it, a channel stands still
 MOSTLY = 0.5  # share of samples in long runs, above which a channel is a staircase
@@ -17,31 +18,33 @@ SAME = 1e-9  # share of the standard deviation by which copies may differ
 
 
 def longest_hold(y: Samples) -> tuple[int, int]:
-    """First sample and length of the longest run of equal values inside a continuous channel; 0 and 0 without one.
+    """First sample and length of the longest run of equal values inside a continuous channel; 0 and 0 without one."""
+    return max(held(y), key=lambda run: run[1], default=(0, 0))
 
-    Runs at the start and the end are rest, and so are those that the channel comes to and leaves gently, as a joint
-    that sticks does where it turns; those at the extreme values are clipping. A coarsely quantised channel repeats its
-    values anyway, and so does one that was computed from such a channel: a run must be longer than the short ones let
-    expect. A channel that mostly holds is switched in steps.
+
+def held(y: Samples) -> list[tuple[int, int]]:
+    """First samples and lengths of the runs of equal values inside a continuous channel: where the sensor hung.
+
+    A run at the start is rest, and so are those that the channel comes to and leaves gently, as a joint that sticks
+    does where it turns, and one at the end to which it came gently, or at 0; those at the extreme values are clipping.
+    A coarsely quantised channel repeats its values anyway, and so does one that was computed from such a channel: a run
+    must be longer than the short ones let expect. A channel that mostly holds is switched in steps.
     """
     same = np.diff(y) == 0
-    if quantisation_step(y) > GENTLE * _usual_step(y) or repetition(y) > 1:
-        return 0, 0
+    if not np.any(same) or quantisation_step(y) > GENTLE * _usual_step(y) or repetition(y) > 1:
+        return []
     edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int)))
     starts, ends = edges[::2], edges[1::2] + 1
-    inside = (starts > 0) & (ends < y.size) & (y[starts] > y.min()) & (y[starts] < y.max())
+    last = (ends == y.size) & (ends - starts >= HELD_TO_THE_END) & (y[starts] != 0)
+    inside = (starts > 0) & ((ends < y.size) | last) & (y[starts] > y.min()) & (y[starts] < y.max())
     lengths = np.where(inside, ends - starts, 0)
     if np.sum(lengths[lengths >= HELD]) > MOSTLY * y.size:
-        return 0, 0
-    lengths = np.where(inside & ~_gentle(y, np.maximum(starts, 1), np.minimum(ends, y.size - 1)), lengths, 0)
-    if lengths.size == 0 or lengths.max() < HELD:
-        return 0, 0
-    longest = int(np.argmax(lengths))
+        return []
+    lengths = np.where(inside & ~_gentle(y, np.maximum(starts, 1), ends), lengths, 0)
     runs = ends - starts
     usual = max(float(np.sum((runs - 1)[runs < HELD])) / y.size, RAREST)
-    if y.size * usual ** ((lengths[longest] - 1) / TOGETHER) > CHANCE:
-        return 0, 0
-    return int(starts[longest]), int(lengths[longest])
+    long = (lengths >= HELD) & (y.size * usual ** ((lengths - 1) / TOGETHER) <= CHANCE)
+    return [(int(start), int(length)) for start, length in zip(starts[long], lengths[long], strict=True)]
 
 
 def _gentle(y: Samples, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -49,7 +52,8 @@ def _gentle(y: Samples, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> N
 
     Of a displacement both steps are small beside the usual step; a velocity is 0 then, and was small before.
     """
-    step = np.maximum(np.abs(y[starts] - y[starts - 1]), np.abs(y[ends] - y[ends - 1]))
+    left = np.minimum(ends, y.size - 1)  # nothing where the record ends
+    step = np.maximum(np.abs(y[starts] - y[starts - 1]), np.abs(y[left] - y[ends - 1]))
     slow = step <= GENTLE * _usual_step(y)
     return slow | ((y[starts] == 0) & (step <= GENTLE * y.std()))
 

@@ -44,6 +44,8 @@ def hypothesis_name(key: str) -> str:
 
 
 def _effect_name(part: str) -> str:
+    if "@" not in part:  # a channel, or the record
+        return part
     cause, _, place = part.partition("@")
     kind, colon, j = place.partition(":")
     at = (kind, j) if colon else tuple(int(end) for end in place.split("-"))
@@ -66,23 +68,30 @@ def decisive_checks(d: Dictionary) -> list[Dictionary]:
     """
     decision = decision_of(d)
     stopped = decision.get("stopped_by")
-    rows = [row for of in _decisive(d) for row in standing(decision, of) if row != stopped]
+    rows = [row for of in _decisive(d) for row in standing(decision, of) if row != stopped and not _fine(row)]
     return [*rows, *([stopped] if stopped is not None else [])]
+
+
+def _fine(row: Dictionary) -> bool:
+    """Whether a look at a sensor found nothing."""
+    return row["stage"] == "sensors" and row["passed"]
 
 
 def _decisive(d: Dictionary) -> dict[str, None]:
     """Keys of the hypotheses that a verdict rests on."""
     decision = decision_of(d)
-    clipped = (row["of"] for row in decision.get("checks") or () if row["stage"] == "sensors")
+    looked_at = (row["of"] for row in decision.get("checks") or () if row["stage"] == "sensors" and not row["passed"])
     stopped = (decision.get("stopped_by") or {}).get("of")
     winner = decision.get("winner", "").removesuffix(MAP)
-    return dict.fromkeys(filter(None, (MODEL, *clipped, winner, nearest(d), stopped)))
+    return dict.fromkeys(filter(None, (MODEL, *looked_at, winner, nearest(d), stopped)))
 
 
 def standing(decision: Dictionary, of: str) -> list[Dictionary]:
     """The checks of a hypothesis that stand, the last of each name, in the order in which they were made."""
     rows = decision.get("checks") or ()
-    rows = rows if of == MODEL else rows[decision.get("since", 0) :]
+    since = decision.get("since", 0)
+    looks = [row for row in rows[:since] if row["stage"] == "sensors"]
+    rows = rows if of == MODEL else [*looks, *rows[since:]]
     last: dict[str, Dictionary] = {}
     for row in rows:
         if row["of"] == of:

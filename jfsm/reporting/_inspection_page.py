@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from jfsm.reporting._checks import checks_table
 from jfsm.reporting._inspection_pictures import inspection_pictures
 from jfsm.reporting._inspection_tables import (
     consistency_table,
@@ -50,6 +51,7 @@ def render_inspection(d: Dictionary) -> str:
         record_line=" · ".join(extent(d)),
         answers=_answers(d, channels),
         pictures=inline(inspection_pictures(d)),
+        looked=checks_table(d.get("checks") or (), "What was looked at first", {}),
         warnings=remarks_table("Warnings", warnings),
         remarks=remarks_table("Remarks", remarks),
         channels=inspected_channels_table(channels),
@@ -100,7 +102,10 @@ def _answers(d: Dictionary, channels: Sequence[Dictionary]) -> list[Answer]:
 def _drive(d: Dictionary) -> Answer:
     drives = list(d["drives"] or ())
     if not drives:
-        return Answer("Driven by", "Nothing", ("a free decay",))
+        decays = {check["passed"] for check in d.get("checks") or () if check["name"] == "drive_measured"}
+        if False in decays:
+            return Answer("Driven by", "Nothing that was measured", ("the motion does not decay",))
+        return Answer("Driven by", "Nothing", ("a free decay",) if True in decays else ("no force was measured",))
     periods = d.get("periods")
     detail = f"{periods['count']} periods of {quantity(periods['seconds'], 's')}" if periods else "not periodic"
     shown = drives[:MOST_CHANNELS]

@@ -21,6 +21,8 @@ from ..evidence.plain import as_plain
 from ..evidence.scorecard import GIVEN
 from ..evidence.setup import Problem
 from ..hypotheses.candidate import Candidate
+from ..look.looked import Looked
+from ..look.told import beside, told, with_signs
 from ..search.batches import LeftBehind
 from ..verdict.decision import Decision
 from ..verdict.judge import evidence_behind
@@ -78,6 +80,7 @@ def assemble(
     gain: Gain | None,
     runs: list[dict],
     leading: Leading | None,
+    looked: Looked,
 ) -> Diagnosis:
     """The diagnosis, with everything that the report needs."""
     decision, unfinished, model, records = reached.decision, tested.unfinished, problem.model, problem.records
@@ -97,10 +100,12 @@ def assemble(
     drawn = Drawn(missing, runs, reached.term, first.record, first.period, with_shape=verdict != "consistent")
     sentence = verdict_sentence(decision, reached.winner, findings, gain, shape, differ, imposed=imposed)
     sentence = beside_late_forces(sentence, verdict, late)
-    advice = verdict_advice(decision, gain, imposed=imposed)
-    told = {
+    sentence, advice = told(sentence, looked, verdict_advice(decision, gain, imposed=imposed))
+    decision = beside(decision, looked)
+    findings = with_signs(findings, verdict, looked)
+    data = {
         "jfsm": jfsm_version(),
-        "verdict": verdict,
+        "verdict": decision.verdict,
         "finished": not unfinished.notes,
         "untried": list(unfinished.untried),
         "sentence": sentence,
@@ -119,9 +124,9 @@ def assemble(
         "evidence": reached.evidence.plain,
     }
     return Diagnosis(
-        verdict=verdict, findings=findings, candidates=candidates, extended=extended, refitted=refit,
+        verdict=decision.verdict, findings=findings, candidates=candidates, extended=extended, refitted=refit,
         gain=gain, detectable={c: s.size for c, s in smallest.items()}, noise=noise_by_channel(first), notes=notes,
-        sentence=sentence, advice=advice, told=told, drawn=drawn, leading=leading,
+        sentence=sentence, advice=advice, told=data, drawn=drawn, leading=leading,
         decision=decision, finished=not unfinished.notes, untried=unfinished.untried,
     )  # fmt: skip
 

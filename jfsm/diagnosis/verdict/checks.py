@@ -4,8 +4,11 @@ from collections.abc import Mapping
 from operator import ge, gt, le, lt
 from typing import Literal, NamedTuple
 
+from ..._result import Check as Check
+from ..._result import Relation
+from ...records import LOOKS
+
 Stage = Literal["searched", "sensors", "detected", "admissible", "named", "sufficient", "confirmed"]
-Relation = Literal[">=", "<=", ">", "<"]
 
 STAGES: Mapping[Stage, str] = {
     "searched": "Was everything looked into?",
@@ -16,20 +19,6 @@ STAGES: Mapping[Stage, str] = {
     "sufficient": "Is what it leaves only noise, and its shape right?",
     "confirmed": "Do runs over held-out readings agree?",
 }
-
-
-class Check(NamedTuple):
-    """One comparison: what was measured of which hypothesis, the limit, and the outcome."""
-
-    stage: Stage
-    name: str
-    of: str
-    measured: float
-    relation: Relation
-    threshold: float
-    unit: str
-    passed: bool
-    says: str
 
 
 class Kind(NamedTuple):
@@ -48,6 +37,30 @@ CHECKS: Mapping[str, Kind] = {
         ">=",
         "searches that were finished",
         "The search went on to its end; else a cause is half as sure, and without one nothing is decided.",
+    ),
+    **{name: Kind("sensors", look.relation, look.unit, look.asks) for name, look in LOOKS.items()},
+    "right_size": Kind(
+        "sensors",
+        ">",
+        "log of a ratio",
+        "No channel is off from what the model as given makes of the drive by a factor between units; asked where its "
+        "shape is the model's, or it is a thousand times as large.",
+        ("unit_thousand", "unit_large", "unit_about", "unit_follows", "unit_alike", "unit_near"),
+    ),
+    "follows_model": Kind(
+        "sensors",
+        ">",
+        "cosine",
+        "The motion of a driven point does not oppose what the model as given makes of the force, while that takes "
+        "energy out of it.",
+        ("opposed", "opposed_power"),
+    ),
+    "channels_in_place": Kind(
+        "sensors",
+        ">=",
+        "ratio",
+        "No two channels of a kind fit the model in each other's place far better than in their own.",
+        ("in_place", "swapped"),
     ),
     "no_clipping": Kind(
         "sensors",

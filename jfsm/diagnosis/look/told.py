@@ -1,0 +1,66 @@
+"""What was looked at before, in a verdict: its checks, channels of the wrong sign as causes, and words."""
+
+from dataclasses import replace
+
+from ..._result import Estimate
+from ...structures import Structure, causes
+from .._diagnosis import Finding
+from ..verdict.decision import Decision
+from .looked import MENDED, TURNED, Looked
+
+PROBABILITY = 0.99
+"""That a channel is inverted whose sign is wrong by five standard errors and more."""
+
+
+def beside(decision: Decision, looked: Looked) -> Decision:
+    """The decision with what was looked at before it; a channel of the wrong sign is a cause, whatever else is."""
+    verdict = "cause" if looked.inverted else decision.verdict
+    stopped = None if looked.inverted else decision.stopped_by
+    return replace(decision, verdict=verdict, stopped_by=stopped).after(looked.checks)
+
+
+def with_signs(findings: tuple[Finding, ...], verdict: str, looked: Looked) -> tuple[Finding, ...]:
+    """The findings of a verdict, channels of the wrong sign first; own values are no findings beside them."""
+    if not looked.inverted:
+        return findings
+    return (*_sign_findings(looked), *(findings if verdict == "cause" else ()))
+
+
+def _sign_findings(looked: Looked) -> tuple[Finding, ...]:
+    """Channels of the wrong sign as findings: a gain error of −2 turns a sign."""
+    found = []
+    for kind, j in looked.inverted:
+        law = MENDED[kind].kind
+        cause, gain = causes()[law], MENDED[kind].parameters[0].name
+        values = {gain: Estimate(TURNED, TURNED, TURNED, "1")}
+        words = _why(looked, kind, j)
+        found.append(
+            Finding(cause.id, cause.family, (kind, j), PROBABILITY, values, (), words, "a wrong sign", PROBABILITY,
+                    members={cause.id: PROBABILITY}, size=values[gain])
+        )  # fmt: skip
+    return tuple(found)
+
+
+def _why(looked: Looked, kind: str, dof: int) -> str:
+    """The look that showed it."""
+    own = [check.says for check in looked.turned_by if check.of == f"{kind} {dof}"]
+    return next(iter([*own, *(check.says for check in looked.turned_by)]), "")
+
+
+def mended_model(structure: Structure, looked: Looked) -> Structure:
+    """A structure that reads its channels with the signs that they were recorded with."""
+    for kind, j in looked.inverted:
+        structure = structure + MENDED[kind](TURNED, at=(kind, j))
+    return structure
+
+
+def told(sentence: str, looked: Looked, advice: str) -> tuple[str, str]:
+    """Sentence and advice of a verdict with what was seen before it."""
+    if looked.inverted:
+        wrong = " ".join(dict.fromkeys(f"{_why(looked, *channel)}." for channel in looked.inverted))
+        turns = "".join(f".turned({channel!r})" for channel in looked.inverted)
+        sentence = f"{wrong[0].upper()}{wrong[1:]} With the sign turned: {sentence}"
+        advice = f"Turn the sign: record{turns}. {advice}"
+    if looked.undriven:
+        sentence = f"{sentence} Without a measured force the motion does not decay: {looked.undriven}."
+    return sentence, advice
