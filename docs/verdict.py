@@ -198,7 +198,7 @@ def _name_of_check(node: ast.AST) -> str | None:
     """The name of the check that a call makes."""
     if not (isinstance(node, ast.Call) and ast.unparse(node.func).split(".")[-1] in ("check", "_check", "checked")):
         return None
-    return next((one.value for one in node.args[:1] if isinstance(one, ast.Constant)), None)
+    return next((str(one.value) for one in node.args[:1] if isinstance(one, ast.Constant)), None)
 
 
 def _thresholds() -> Iterator[str]:
