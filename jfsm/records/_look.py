@@ -21,6 +21,7 @@ from jfsm.records._power import ERRORS as POWER_ERRORS
 from jfsm.records._power import Power, mean_power
 from jfsm.records._rest import Span, rest_words, rough_noise, span_of_motion
 from jfsm.records._silence import silent_forces
+from jfsm.records._torn import far_outside
 from jfsm.records._unit_factors import likely_unit, miss
 
 FLAT = 1e-12  # of the largest value: an extent below it is rounding
@@ -113,7 +114,7 @@ def look(record: AbstractRecord) -> Look:
     if len(record) < FEWEST_SAMPLES:
         return Look(tuple(_dead(record)), Span(0, len(record)), (), ())
     sound = mended(record)
-    checks = [*_dead(record), *_torn(record)]
+    checks = [*_dead(record), *_torn(record), *_torn_base(record)]
     span = span_of_motion(sound)
     share = 1.0 - (span.end - span.begin) / len(record)
     checks.append(_checked("moves_throughout", "record", share, 0.0, "; ".join(rest_words(record, span)) or "moves"))
@@ -166,6 +167,14 @@ def _torn(record: AbstractRecord) -> Iterator[Check]:
         yield _checked("no_torn_samples", name, int(torn.sum()), 0, words.rstrip("."))
         words = hung_words(record.time, hung) if np.any(hung) else "no sample repeats the one before"
         yield _checked("no_hung_samples", name, int(hung.sum()), 0, words.rstrip("."))
+
+
+def _torn_base(record: AbstractRecord) -> Iterator[Check]:
+    base = record.base_acceleration
+    if base is not None:
+        torn = far_outside("base_acceleration", base)
+        words = torn_words(record.time, base, torn, record.units["base_acceleration"]) if np.any(torn) else "none torn"
+        yield _checked("no_torn_samples", "base_acceleration", int(torn.sum()), 0, words.rstrip("."))
 
 
 def _readings(record: AbstractRecord, dof: int) -> dict[str, Reading]:
