@@ -111,7 +111,7 @@ class Rounds:
         found = search(now, self.given, self.refitted, self.problem, self.steps.of("single causes"))
         slow = [c for c in (*late, *stiff) if c not in now]
         more = list[Candidate]()
-        if not self._limit.over:
+        if found.trials and not self._limit.over:
             found, more = self._worth_a_second_round(found, late, stiff, slow, others)
         if more:
             tell, known = self.steps.of("more single causes"), self._apart_from_the_drive(found.trials)
