@@ -935,3 +935,12 @@ def test_noise_leaves_no_more_of_any_hypothesis_than_of_the_best():
     capped = found.at_floor(least)
     assert np.all(capped.expected == [0.001, 0.01]) and np.all(capped.scatter == [0.001, 0.005])
     assert np.all(capped.excess == errors - capped.expected) and capped.left() > found.left()
+
+
+@pytest.mark.parametrize(("left", "outcome_is"), [(0.002, f"cause {FRICTION}"), (0.02, "undecided refitted")])
+def test_what_one_effect_explains_is_not_lost_with_a_second_that_these_records_cannot_show(left, outcome_is):
+    single = card(8000.0, left, "coulomb")
+    pair = card(12000.0, left / 20, "coulomb", "stiffness_drift", not_identifiable="changes with time, in a decay")
+    decision = judged(single, pair)
+    assert outcome(decision) == outcome_is
+    assert decision.reasons[pair.key] == "changes with time, in a decay"

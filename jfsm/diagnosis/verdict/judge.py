@@ -97,10 +97,16 @@ def _decided(evidence: Evidence, limits: Thresholds, long_run: bool) -> Decision
     return _same_in_all_records(decision, evidence, limits)
 
 
+def _pair_refused(decision: Decision, evidence: Evidence) -> bool:
+    """Whether two effects were refused for their shape, or as these records cannot show them."""
+    pairs, by = [c.key for c in evidence.candidates if len(c.effects) > 1], decision.stopped_by
+    unseen = by is not None and by.name == "identifiable_here" and by.of in pairs
+    return unseen or any(decision.reasons[key] == WRONG_SHAPE for key in pairs)
+
+
 def _may_be_one_of_two(decision: Decision, evidence: Evidence, limits: Thresholds) -> bool:
-    """Whether two effects were refused for their shape, and held-out readings do not confirm their classes."""
-    refused = [c for c in evidence.candidates if len(c.effects) > 1 and decision.reasons[c.key] == WRONG_SHAPE]
-    if decision.verdict != "undecided" or not refused:
+    """Whether two effects were refused, and held-out readings do not confirm their classes."""
+    if decision.verdict != "undecided" or not _pair_refused(decision, evidence):
         return False
     errors = (evidence.held_out(near) for near in decision.near[:MOST_NEAR])
     return not any(one is not None and one.closed >= limits.nearly_all for one in errors)
