@@ -43,14 +43,18 @@ def tolerance(ratio: Ratio, known: UnitFactor, *, imposed: bool) -> float | None
     """How far a ratio may be from a factor between units, as a logarithm, and be that factor; None where its shape says
     that the model is wrong instead, or says nothing."""
     limits, cosine = THRESHOLDS, abs(ratio.cosine)
-    same = ratio.spread < limits.unit_alike and cosine > 1.0 - limits.unit_alike
+    if known.size < limits.unit_large:  # a value may be off by as much: stiffness and mass have to show it alike
+        return limits.unit_near if ratio.wide and _is_even(ratio, limits.unit_near) else None
     if known.size >= limits.unit_thousand and ratio.times > 1.0 and ratio.wide:
         # Nothing but a unit makes a motion so much larger than a model has it, whatever its shape.
         return limits.unit_about if cosine > limits.unit_follows else None
-    if known.size >= limits.unit_thousand or (known.size >= limits.unit_large and (ratio.wide or imposed)):
-        return limits.unit_alike if same else None
-    near = ratio.spread < limits.unit_near and cosine > 1.0 - limits.unit_near
-    return limits.unit_near if near and ratio.wide else None
+    told = ratio.wide or imposed or known.size >= limits.unit_thousand
+    return limits.unit_alike if told and _is_even(ratio, limits.unit_alike) else None
+
+
+def _is_even(ratio: Ratio, blur: float) -> bool:
+    """Whether a ratio is the same at all frequencies, in size and phase."""
+    return ratio.spread < blur and abs(ratio.cosine) > 1.0 - blur
 
 
 def _size_check(record: Record, channel: Channel, ratio: Ratio) -> Check | None:
