@@ -26,9 +26,10 @@ def held(y: Samples) -> list[tuple[int, int]]:
     """First samples and lengths of the runs of equal values inside a continuous channel: where the sensor hung.
 
     A run at the start is rest, and so are those that the channel comes to and leaves gently, as a joint that sticks
-    does where it turns, and one at the end to which it came gently, or at 0; those at the extreme values are clipping.
-    A coarsely quantised channel repeats its values anyway, and so does one that was computed from such a channel: a run
-    must be longer than the short ones let expect. A channel that mostly holds is switched in steps.
+    does where it turns, and one at the end to which it came gently, or at 0; those at the extreme values, or twice at
+    one value, are clipping. A coarsely quantised channel repeats its values anyway, and so does one that was computed
+    from such a channel: a run must be longer than the short ones let expect. A channel that mostly holds is switched in
+    steps.
     """
     same = np.diff(y) == 0
     if not np.any(same) or quantisation_step(y) > GENTLE * _usual_step(y) or repetition(y) > 1:
@@ -44,6 +45,8 @@ def held(y: Samples) -> list[tuple[int, int]]:
     runs = ends - starts
     usual = max(float(np.sum((runs - 1)[runs < HELD])) / y.size, RAREST)
     long = (lengths >= HELD) & (y.size * usual ** ((lengths - 1) / TOGETHER) <= CHANCE)
+    levels, counts = np.unique(y[starts[long]], return_counts=True)
+    long[long] = np.isin(y[starts[long]], levels[counts == 1])  # the end of a range is come back to
     return [(int(start), int(length)) for start, length in zip(starts[long], lengths[long], strict=True)]
 
 

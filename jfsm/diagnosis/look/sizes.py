@@ -42,23 +42,19 @@ def beside_model(record: Record, model: Structure) -> Iterator[Check]:
 def tolerance(ratio: Ratio, known: UnitFactor, *, imposed: bool) -> float | None:
     """How far a ratio may be from a factor between units, as a logarithm, and be that factor; None where its shape says
     that the model is wrong instead, or says nothing."""
-    limits, huge = THRESHOLDS, known.size >= THRESHOLDS.unit_thousand
-    if huge and ratio.times > 1.0 and ratio.wide:
+    limits, cosine = THRESHOLDS, abs(ratio.cosine)
+    if known.size < limits.unit_large:  # a value may be off by as much: stiffness and mass have to show it alike
+        return limits.unit_near if ratio.wide and _is_even(ratio, limits.unit_near) else None
+    if known.size >= limits.unit_thousand and ratio.times > 1.0 and ratio.wide:
         # Nothing but a unit makes a motion so much larger than a model has it, whatever its shape.
-        return limits.unit_about if abs(ratio.cosine) > limits.unit_follows else None
-    large = huge or _is_large(ratio, known, imposed=imposed)
-    within = limits.unit_alike if large else limits.unit_near
-    return within if (large or ratio.wide) and _is_the_models(ratio, within) else None
+        return limits.unit_about if cosine > limits.unit_follows else None
+    told = ratio.wide or imposed or known.size >= limits.unit_thousand
+    return limits.unit_alike if told and _is_even(ratio, limits.unit_alike) else None
 
 
-def _is_large(ratio: Ratio, known: UnitFactor, *, imposed: bool) -> bool:
-    """Whether a factor is large, and the record shows it on both sides of the model's mode, or along a motion."""
-    return known.size >= THRESHOLDS.unit_large and (ratio.wide or imposed)
-
-
-def _is_the_models(ratio: Ratio, within: float) -> bool:
-    """Whether the shape of a channel is the model's, but for so much."""
-    return ratio.spread < within and abs(ratio.cosine) > 1.0 - within
+def _is_even(ratio: Ratio, blur: float) -> bool:
+    """Whether a ratio is the same at all frequencies, in size and phase."""
+    return ratio.spread < blur and abs(ratio.cosine) > 1.0 - blur
 
 
 def _size_check(record: Record, channel: Channel, ratio: Ratio) -> Check | None:
