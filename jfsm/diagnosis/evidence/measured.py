@@ -87,7 +87,8 @@ class Weighed:
     def extended(self, decision: Decision, late: Late) -> Structure:
         """The structure to go on with, as it shows in channels that are so late."""
         key = self._handed_out(decision)
-        return self.held_out.model if key == GIVEN else showing_late(self.trial(key).extended(), late)
+        structure = self.held_out.model if key == GIVEN else self.trial(key).extended()
+        return structure if decision.verdict == "consistent" else showing_late(structure, late)
 
     def _handed_out(self, decision: Decision) -> str:
         """Key of the hypothesis to go on with: never one that runs worse over held-out readings than as given."""
