@@ -48,8 +48,13 @@ def tolerance(ratio: Ratio, known: UnitFactor, *, imposed: bool) -> float | None
     if known.size >= limits.unit_thousand and ratio.times > 1.0 and ratio.wide:
         # Nothing but a unit makes a motion so much larger than a model has it, whatever its shape.
         return limits.unit_about if cosine > limits.unit_follows else None
-    told = ratio.wide or imposed or known.size >= limits.unit_thousand
-    return limits.unit_alike if told and _is_even(ratio, limits.unit_alike) else None
+    seen = imposed or _tells(ratio, known)
+    return limits.unit_alike if seen and _is_even(ratio, limits.unit_alike) else None
+
+
+def _tells(ratio: Ratio, known: UnitFactor) -> bool:
+    """Whether lines on both sides of the model's mode show a factor, or it is so large that no value is off by as much."""
+    return ratio.wide or known.size >= THRESHOLDS.unit_thousand
 
 
 def _is_even(ratio: Ratio, blur: float) -> bool:
