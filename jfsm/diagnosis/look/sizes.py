@@ -42,14 +42,15 @@ def beside_model(record: Record, model: Structure) -> Iterator[Check]:
 def tolerance(ratio: Ratio, known: UnitFactor, *, imposed: bool) -> float | None:
     """How far a ratio may be from a factor between units, as a logarithm, and be that factor; None where its shape says
     that the model is wrong instead, or says nothing."""
-    limits, cosine = THRESHOLDS, abs(ratio.cosine)
+    limits = THRESHOLDS
     if known.size < limits.unit_large:  # a value may be off by as much: stiffness and mass have to show it alike
-        return limits.unit_near if ratio.wide and _is_even(ratio, limits.unit_near) else None
-    if known.size >= limits.unit_thousand and ratio.times > 1.0 and ratio.wide:
+        seen, within = ratio.wide, limits.unit_near
+    elif known.size >= limits.unit_thousand and ratio.times > 1.0 and ratio.wide:
         # Nothing but a unit makes a motion so much larger than a model has it, whatever its shape.
-        return limits.unit_about if cosine > limits.unit_follows else None
-    seen = imposed or _tells(ratio, known)
-    return limits.unit_alike if seen and _is_even(ratio, limits.unit_alike) else None
+        return limits.unit_about if abs(ratio.cosine) > limits.unit_follows else None
+    else:
+        seen, within = imposed or _tells(ratio, known), limits.unit_alike
+    return within if seen and _is_even(ratio, within) else None
 
 
 def _tells(ratio: Ratio, known: UnitFactor) -> bool:
