@@ -54,7 +54,7 @@ def tolerance(ratio: Ratio, known: UnitFactor, *, imposed: bool) -> float | None
 
 
 def _tells(ratio: Ratio, known: UnitFactor) -> bool:
-    """Whether lines on both sides of the model's mode show a factor, or it is so large that no value is off by as much."""
+    """Whether lines on both sides of the model's mode show a factor, or no value is off by as much."""
     return ratio.wide or known.size >= THRESHOLDS.unit_thousand
 
 
