@@ -43,19 +43,20 @@ def tolerance(ratio: Ratio, known: UnitFactor, *, imposed: bool) -> float | None
     """How far a ratio may be from a factor between units, as a logarithm, and be that factor; None where its shape says
     that the model is wrong instead, or says nothing."""
     limits = THRESHOLDS
-    if known.size < limits.unit_large:  # a value may be off by as much: stiffness and mass have to show it alike
-        seen, within = ratio.wide, limits.unit_near
-    elif known.size >= limits.unit_thousand and ratio.times > 1.0 and ratio.wide:
+    if known.size >= limits.unit_large:
+        return _of_a_large_factor(ratio, known.size >= limits.unit_thousand, imposed=imposed)
+    # A value may be off by as much: stiffness and mass have to show it alike.
+    return limits.unit_near if ratio.wide and _is_even(ratio, limits.unit_near) else None
+
+
+def _of_a_large_factor(ratio: Ratio, thousands: bool, *, imposed: bool) -> float | None:
+    """The tolerance of a factor of thirty or more."""
+    limits = THRESHOLDS
+    if thousands and ratio.times > 1.0 and ratio.wide:
         # Nothing but a unit makes a motion so much larger than a model has it, whatever its shape.
         return limits.unit_about if abs(ratio.cosine) > limits.unit_follows else None
-    else:
-        seen, within = imposed or _tells(ratio, known), limits.unit_alike
-    return within if seen and _is_even(ratio, within) else None
-
-
-def _tells(ratio: Ratio, known: UnitFactor) -> bool:
-    """Whether lines on both sides of the model's mode show a factor, or no value is off by as much."""
-    return ratio.wide or known.size >= THRESHOLDS.unit_thousand
+    told = ratio.wide or imposed or thousands
+    return limits.unit_alike if told and _is_even(ratio, limits.unit_alike) else None
 
 
 def _is_even(ratio: Ratio, blur: float) -> bool:
