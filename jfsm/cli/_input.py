@@ -69,8 +69,6 @@ class _Channels:
     at_rest: Annotated[
         bool, typer.Option("--at-rest", help="At rest at the first sample.", rich_help_panel=CHANNELS)
     ] = False
-    since: Annotated[float | None, option("Leave out what the record shows before.", "SECONDS", CHANNELS)] = None
-    until: Annotated[float | None, option("Leave out what the record shows after.", "SECONDS", CHANNELS)] = None
     drive: Annotated[
         str | None, option("What is imposed: force, or motion (a component on a rig).", "force|motion", CHANNELS)
     ] = None
@@ -99,10 +97,6 @@ class _Channels:
             )
         except TypeError as error:  # from what the file holds; a TypeError of any later step is a mistake of ours
             raise ValueError(f"{path}: {error}") from error
-        if self.since is not None:
-            record = record.since(self.since)
-        if self.until is not None:
-            record = record.until(self.until)
         return record if self.resample is None else record.resample(_rate(self.resample, record))
 
 
