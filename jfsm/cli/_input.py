@@ -73,8 +73,8 @@ class _Channels:
         str | None, option("What is imposed: force, or motion (a component on a rig).", "force|motion", CHANNELS)
     ] = None
 
-    def read_file(self, path: Path) -> "Record":
-        """The record in a file."""
+    def read_file(self, path: Path, *, cut: bool = False) -> "Record":
+        """The record in a file, or with `cut` the part of it between the instants that were given."""
         from ..records import read
 
         try:
@@ -97,6 +97,8 @@ class _Channels:
             )
         except TypeError as error:  # from what the file holds; a TypeError of any later step is a mistake of ours
             raise ValueError(f"{path}: {error}") from error
+        if cut:
+            record = record.between(self.since, self.until)
         return record if self.resample is None else record.resample(_rate(self.resample, record))
 
 
@@ -108,7 +110,7 @@ class RecordFile(_Channels):
 
     def read(self) -> "Record":
         """The record in the file."""
-        return self.read_file(self.record).between(self.since, self.until)
+        return self.read_file(self.record, cut=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +121,7 @@ class RecordFiles(_Channels):
 
     def read(self) -> "list[Record]":
         """The records in the files."""
-        return [self.read_file(path).between(self.since, self.until) for path in self.records]
+        return [self.read_file(path, cut=True) for path in self.records]
 
     def held_out(self, given: Sequence[str] | None) -> "float | list[Record] | None":
         """A share, nothing, or the records in other files."""
