@@ -199,11 +199,7 @@ TIME = DT * np.arange(100)
         ((GUESS, []), {}, "`record` must hold at least one record; the sequence is empty"),
         ((GUESS, jfsm.Record(TIME, tones(TIME))), {}, r"`record` must hold a response \(displacement, velocity or acc"),
         ((GUESS, measured(n=31)), {}, "`record` must hold at least 32 samples to tell noise from motion; it has 31"),
-        (
-            (GUESS, jfsm.Record(TIME, tones(TIME), np.ones(100))),
-            {},
-            "`displacement` 1 is constant .1.: nothing was measured there. Leave a dead chan",
-        ),
+        ((GUESS, jfsm.Record(TIME, tones(TIME), np.ones(100))), {}, "nothing was measured there. Leave a dead channel"),
         ((GUESS, jfsm.Record(TIME, {2: tones(TIME)}, tones(TIME))), {}, "`record` names degree of freedom 2; the str"),
         ((jfsm.Structure([0.0]), measured()), {}, "`mass` must be positive for the structure to move"),
         ((GUESS, measured()), {"reconstruction": "cubic"}, '`reconstruction` must be "band-limited", "linear" or "ho'),

@@ -8,11 +8,10 @@ from numpy.typing import NDArray
 
 from jfsm.records._abstract_record import AbstractRecord
 from jfsm.records._core import core_std
-from jfsm.records._noise_floor import SHORTEST, noise_floor
+from jfsm.records._noise_floor import noise_floor
 from jfsm.records._quantisation import quantisation_step
 
 BLOCKS = 50  # pieces of a record whose power is compared with that of noise
-PARTS = 8  # of the last piece that moves, by which the beginning of rest is known
 LOUD = 2.0  # power of a piece, in those of noise, from which something moves
 LEAST = 0.05  # share of a record that is always used
 CREEP = 0.02  # share of a channel's extent that it may creep by, all in all, where nothing moves
@@ -32,7 +31,8 @@ def span_of_motion(record: AbstractRecord) -> Span:
 
     A structure at rest shows noise about one level, or a slow creep of the sensor. A released structure is at rest once
     all its motion has died away, and before it is let go; one that a force or a motion drives, only while that rests
-    too, and if that is a fifth of the record or more. A structure that a constant force holds is not at rest.
+    too, and if that is a fifth of the record or more. A structure that a constant force holds is not at rest. The piece
+    in which the motion ends is kept to its end: that friction holds what it stopped shows there alone.
     """
     n = len(record)
     everything = Span(0, n)
@@ -79,9 +79,7 @@ def _loud_until(y: NDArray[np.float64], noise: float) -> int:
     loud = [k for k, block in enumerate(blocks) if np.mean((y[block] - level) ** 2) > LOUD * noise**2]
     if not loud:
         return 0
-    last = _before_creep(y, blocks, noise, loud[-1])
-    end = int(blocks[last][-1]) + 1
-    return end if last == loud[-1] else end - _still_at_the_end(y[blocks[last]], noise)
+    return int(blocks[_before_creep(y, blocks, noise, loud[-1])][-1]) + 1
 
 
 def _before_creep(y: NDArray[np.float64], blocks: list[NDArray[np.int64]], noise: float, last: int) -> int:
@@ -111,17 +109,6 @@ def _line(y: NDArray[np.float64]) -> tuple[float, float, float]:
     place = np.linspace(-1.0, 1.0, y.size)
     mean, slope = float(np.mean(y)), float(place @ y / (place @ place))
     return mean, slope, float(np.mean((y - mean - slope * place) ** 2))
-
-
-def _still_at_the_end(y: NDArray[np.float64], noise: float) -> int:
-    """Samples at the end of a piece that show no more than noise about a line."""
-    parts = np.array_split(y, max(1, min(PARTS, y.size // SHORTEST)))
-    still = 0
-    for part in parts[::-1]:
-        if _line(part)[2] > LOUD * noise**2:
-            break
-        still += part.size
-    return still
 
 
 def _released(channels: list[tuple[NDArray[np.float64], float]], begin: int) -> int:
