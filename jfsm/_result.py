@@ -1,6 +1,7 @@
 """Outcomes of a calculation: how it ended, values with their intervals, and comparisons with a limit."""
 
 import enum
+import operator
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -31,6 +32,12 @@ class Estimate:
 
 
 Relation = Literal[">=", "<=", ">", "<"]
+_HOLDS = {">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt}
+
+
+def holds(measured: float, relation: Relation, limit: float) -> bool:
+    """Whether what was measured stands in this relation to a limit."""
+    return bool(_HOLDS[relation](measured, limit))
 
 
 class Check(NamedTuple):

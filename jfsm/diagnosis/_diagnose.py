@@ -25,8 +25,8 @@ from .evidence.setup import Problem
 from .evidence.split import HeldOut, records_of, split
 from .hypotheses.candidate import Candidate
 from .hypotheses.candidates import chosen_causes
+from .look.in_verdict import mended_model
 from .look.looked import held_out_alike, looked_at
-from .look.told import mended_model
 from .report.assemble import Reached, Tested, assemble
 from .report.sentences import leaves_something
 from .report.unfinished import Unfinished

@@ -9,10 +9,13 @@ from typing import Any
 import jax
 
 from .._result import Estimate
-from ..structures import Structure, causes
+from ..structures import Cause, Structure, causes
 from .advice.next_test import Leading, Proposal, proposals
 from .evidence.free_runs import Gain
 from .verdict.decision import Decision, Explanation
+
+FOUND = 0.99
+"""Probability of a sensor's fault that shows without a search: far beyond noise, and yet a record may lie."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,23 @@ class Finding:
     law_open: bool = False
     members: dict[str, float] = field(default_factory=dict)
     size: Estimate | None = None
+
+    @classmethod
+    def of_sensor(
+        cls,
+        cause: Cause,
+        at: tuple,
+        name: str,
+        size: Estimate,
+        sentence: str,
+        kind: str,
+        rivals: tuple["Rival", ...] = (),
+    ) -> "Finding":
+        """A sensor's fault that was found without a search: its one number by name, and what class it is of."""
+        return cls(
+            cause.id, cause.family, at, FOUND, {name: size}, rivals, sentence, kind, FOUND,
+            members={cause.id: FOUND}, size=size,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jfsm._result import Check, Relation
+from jfsm._result import Check, Relation, holds
 from jfsm.records._abstract_record import AbstractRecord
 from jfsm.records._checks import Finding, strongest_frequency
 from jfsm.records._comparison import Comparison, Reading
@@ -135,8 +135,7 @@ def look(record: AbstractRecord) -> Look:
 
 def _checked(name: str, of: str, measured: float, limit: float, says: str, passed: bool | None = None) -> Check:
     kind = LOOKS[name]
-    holds = {">": measured > limit, ">=": measured >= limit, "<": measured < limit, "<=": measured <= limit}
-    outcome = bool(holds[kind.relation]) if passed is None else passed
+    outcome = holds(measured, kind.relation, limit) if passed is None else passed
     return Check("sensors", name, of, float(measured), kind.relation, float(limit), kind.unit, outcome, says)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jfsm.records._quantisation import quantisation_step
+from jfsm.records._runs_of import runs_of
 from jfsm.records._tapers import Samples
 
 HELD = 5  # equal samples in a row, within the record, that no continuous channel has
@@ -34,8 +35,8 @@ def held(y: Samples) -> list[tuple[int, int]]:
     same = np.diff(y) == 0
     if not np.any(same) or quantisation_step(y) > GENTLE * _usual_step(y) or repetition(y) > 1:
         return []
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int)))
-    starts, ends = edges[::2], edges[1::2] + 1
+    starts, ends = runs_of(same)
+    ends = ends + 1
     last = (ends == y.size) & (ends - starts >= HELD_TO_THE_END) & (y[starts] != 0)
     inside = (starts > 0) & ((ends < y.size) | last) & (y[starts] > y.min()) & (y[starts] < y.max())
     lengths = np.where(inside, ends - starts, 0)

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jfsm.records._noise_floor import SHORTEST, noise_floor
+from jfsm.records._runs_of import runs_of
 
 FAR = {"displacement": 30.0, "velocity": 30.0}  # times the extent of all other samples: nothing moves so far and back
 FAR_JUMPING = 1000.0  # the same of a force or an acceleration, which a blow may make
@@ -68,9 +69,8 @@ def _is_code(y: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 def _in_short_runs(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which marked samples stand in runs of at most three."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
     short = np.zeros(mask.size, dtype=bool)
-    for start, end in edges.reshape(-1, 2):
+    for start, end in zip(*runs_of(mask), strict=True):
         short[start:end] = end - start <= LONGEST
     return short
 

@@ -23,5 +23,6 @@ from ._text import print_diagnosis as print_diagnosis
 from ._text import print_inspection as print_inspection
 from ._why import print_why as print_why
 from ._why import why_text as why_text
+from ._wording import capitalised as capitalised
 from ._wording import cause_name as cause_name
 from ._wording import place_name as place_name

@@ -76,6 +76,10 @@ class Cause(NamedTuple):
         """Whether it is a wrong value of the model's own, which a refit mends."""
         return self.family == "parameters"
 
+    def has_sign_of(self, first: float) -> bool:
+        """Whether a number, the first of a law, has the sign of this cause; any has that of one with both."""
+        return not self.sign or math.copysign(1, first) == self.sign
+
     def term(self, at: tuple, **parameters: float) -> Any:
         """The term (or sensor effect) with these numbers.
 
@@ -87,7 +91,7 @@ class Cause(NamedTuple):
             If a parameter has the sign of another cause.
         """
         name, first = self._first(parameters)
-        if self.sign and math.copysign(1, first) != self.sign:
+        if not self.has_sign_of(first):
             must = "positive" if self.sign > 0 else "negative"
             raise ValueError(f"`{name}` of {self.id} must be {must}; got {first}.")
         return self.effect(**parameters, at=at)

@@ -10,8 +10,6 @@ from ...structures import Clipping, Structure, causes
 from .._diagnosis import Estimate, Finding
 from ..hypotheses.law_classes import SENSOR
 
-PROBABILITY = 0.99
-"""That samples at one level are clipped ones: noise does not come back to a level by itself."""
 _NOTICEABLE = 0.002
 """Share of a channel's samples, from which clipping is a finding."""
 _SAME = 1e-9
@@ -45,8 +43,4 @@ def clipped_channel(sensor: Clipping, unit: str) -> Finding:
     """A clipped channel as a finding."""
     limit, cause = sensor.value, causes()["clipping"]
     estimate = Estimate(limit, limit * (1 - _SAME), limit * (1 + _SAME), unit)
-    values = {"limit": estimate}
-    return Finding(
-        cause.id, cause.family, sensor.at, PROBABILITY, values, (), cause.sentence, SENSOR, PROBABILITY,
-        members={cause.id: PROBABILITY}, size=estimate,
-    )  # fmt: skip
+    return Finding.of_sensor(cause, sensor.at, "limit", estimate, cause.sentence, SENSOR)

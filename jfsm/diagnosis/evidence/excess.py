@@ -62,9 +62,3 @@ def explained(t: Predicts, baseline: Predicts, limits: Thresholds = THRESHOLDS) 
 def almost_all(t: Predicts, refitted: Predicts, limits: Thresholds = THRESHOLDS) -> bool:
     """Whether a hypothesis explains almost all of what the refitted model leaves."""
     return explained(t, refitted, limits) >= limits.almost_all and left(t, limits) < limits.much
-
-
-def practically_all(t: Predicts, refitted: Predicts, limits: Thresholds = THRESHOLDS) -> bool:
-    """Whether it explains almost all of what the refitted model leaves, or most of it and the rest is negligible."""
-    negligible = explained(t, refitted, limits) >= limits.nearly_all and left(t, limits) < limits.negligible
-    return negligible or almost_all(t, refitted, limits)

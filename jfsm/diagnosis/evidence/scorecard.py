@@ -119,10 +119,6 @@ class Scorecard:
         return tuple(effect for effect in self.effects if not effect.is_sensor)
 
     @property
-    def families(self) -> list[str]:
-        return sorted(effect.family for effect in self.effects)
-
-    @property
     def label(self) -> str:
         """Its effects in words."""
         return " and ".join(effect.label for effect in self.effects) or f"the model {self.key}"

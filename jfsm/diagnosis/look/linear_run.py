@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import scipy.linalg
+import scipy.signal
 
 from ...plant import Channel, numbers_of
 from ...records import Record
@@ -29,30 +30,13 @@ def driven_run(model: Structure, record: Record) -> Mapping[Channel, np.ndarray]
     still, inverse = np.zeros((dof, dof)), np.linalg.inv(mass)
     flow = np.block([[still, np.eye(dof)], [-inverse @ plant.stiffness, -inverse @ plant.damping]])
     entry = np.vstack([still, inverse])
-    state = _states(flow, entry, force, record.dt)
-    if not np.all(np.isfinite(state)):
+    if np.max(np.abs(np.linalg.eigvals(scipy.linalg.expm(flow * record.dt)))) ** len(record) > _ESCAPED:
         return {}
+    whole = flow, entry, np.eye(2 * dof), np.zeros((2 * dof, dof))
+    state = np.asarray(scipy.signal.lsim(whole, force, record.dt * np.arange(len(record)))[2])
     x, v = state[:, :dof], state[:, dof:]
     a = (state @ flow.T + force @ entry.T)[:, dof:]
     if record.base_acceleration is not None:
         a = a + record.base_acceleration[:, None]
     shown = {"displacement": x, "velocity": v, "acceleration": a}
     return {(kind, j): shown[kind][:, j - 1] for kind, j in record.responses}
-
-
-def _states(flow: np.ndarray, entry: np.ndarray, force: np.ndarray, dt: float) -> np.ndarray:
-    """States (n, 2 dof) under a force that is straight between samples, exactly."""
-    size, inputs = entry.shape
-    block = np.zeros((size + 2 * inputs,) * 2)
-    block[:size, :size], block[:size, size : size + inputs] = flow * dt, entry * dt
-    block[size : size + inputs, size + inputs :] = np.eye(inputs)
-    whole = scipy.linalg.expm(block)
-    step, held, ramp = whole[:size, :size], whole[:size, size : size + inputs], whole[:size, size + inputs :]
-    pushed = force[:-1] @ (held - ramp).T + force[1:] @ ramp.T
-    state, now = np.zeros((len(force), size)), np.zeros(size)
-    if np.max(np.abs(np.linalg.eigvals(step))) ** len(force) > _ESCAPED:
-        return np.full_like(state, np.nan)
-    for i, push in enumerate(pushed, start=1):
-        now = step @ now + push
-        state[i] = now
-    return state

@@ -7,6 +7,7 @@ from itertools import chain
 from ..._result import Check
 from ...plant import check_pair
 from ...records import Look, Record, look, mended, rest_words
+from ...reporting import capitalised
 from ...structures import AccelerationGain, ForceGain, Structure
 from .sizes import beside_model
 
@@ -116,7 +117,7 @@ def _assumed(records: Sequence[Record]) -> str:
 
 def _sound(record: Record, found: Look, inverted: Sequence[tuple[str, int]]) -> Record:
     sound = mended(record)
-    notes = [f"{words[0].upper()}{words[1:]}." for words in rest_words(record, found.span)]
+    notes = [f"{capitalised(words)}." for words in rest_words(record, found.span)]
     part = sound[found.span.begin :] if found.span.begin > 0 else sound
     return _turned(part.noted(*notes) if notes else part, inverted)
 

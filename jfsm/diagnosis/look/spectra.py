@@ -99,13 +99,13 @@ def ratio_of(seen: np.ndarray, expected: np.ndarray, omega: np.ndarray, mode: fl
         return None
     cross = np.sum(seen * expected.conj(), 0)[used]
     coherence = np.abs(cross) ** 2 / (power * own)[used]
-    told = coherence > _COHERENT
-    if np.count_nonzero(told) < _LEAST_LINES:
+    coherent = coherence > _COHERENT
+    if np.count_nonzero(coherent) < _LEAST_LINES:
         return None
-    ratio = cross[told] / power[used][told]
+    ratio = cross[coherent] / power[used][coherent]
     size = np.log(np.abs(ratio))
     low, middle, high = np.quantile(size, [0.25, 0.5, 0.75])
-    lines = omega[used][told]
+    lines = omega[used][coherent]
     wide = bool(lines.min() < mode / _BESIDE and lines.max() > mode * _BESIDE)
     return Ratio(float(np.exp(middle)), float(high - low) / 1.35, float(np.median(ratio.real / np.abs(ratio))), wide)
 

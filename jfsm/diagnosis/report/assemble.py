@@ -21,8 +21,8 @@ from ..evidence.plain import as_plain
 from ..evidence.scorecard import GIVEN
 from ..evidence.setup import Problem
 from ..hypotheses.candidate import Candidate
+from ..look.in_verdict import in_words, with_looks, with_signs
 from ..look.looked import Looked
-from ..look.told import beside, told, with_signs
 from ..search.batches import LeftBehind
 from ..verdict.decision import Decision
 from ..verdict.judge import evidence_behind
@@ -100,8 +100,8 @@ def assemble(
     drawn = Drawn(missing, runs, reached.term, first.record, first.period, with_shape=verdict != "consistent")
     sentence = verdict_sentence(decision, reached.winner, findings, gain, shape, differ, imposed=imposed)
     sentence = beside_late_forces(sentence, verdict, late)
-    sentence, advice = told(sentence, looked, verdict_advice(decision, gain, imposed=imposed))
-    decision = beside(decision, looked)
+    sentence, advice = in_words(sentence, looked, verdict_advice(decision, gain, imposed=imposed))
+    decision = with_looks(decision, looked)
     findings = with_signs(findings, verdict, looked)
     data = {
         "jfsm": jfsm_version(),

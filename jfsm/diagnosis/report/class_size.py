@@ -9,23 +9,20 @@ import numpy as np
 from ..._result import Estimate
 from ...identification import values_of
 from ...plant import forces_of_law
-from ...structures import AbstractTerm
+from ...structures import AbstractTerm, Structure
 from ..evidence.fitted import Trial
 from ..evidence.missing_force import Residual
 from ..hypotheses.law_classes import (
     AMPLITUDE,
-    CHANGING_STIFFNESS,
     DAMPING,
     FASTER,
     FRICTION,
     HARDENING,
     PLAY,
     SOFTENING,
-    SPRING,
-    TWO_SIDED,
     TWO_WAYS,
 )
-from .estimates import Units, name_of
+from .estimates import Units, name_of, unknowns_of_effect
 
 _STEP = 0.1
 """Step of a derivative, in standard deviations of the number."""
@@ -78,7 +75,6 @@ _OF_CLASS: Mapping[str, Measure] = {
         Measure(_equivalent_damping, lambda units: f"{units['force']}*s/{units['displacement']}"),
     ),
     **dict.fromkeys((HARDENING, SOFTENING, PLAY), _GAINED),
-    **dict.fromkeys((SPRING, TWO_SIDED, CHANGING_STIFFNESS), _FORCE),
 }
 """Of friction the energy that it takes, by the way; of damping what it adds to a dashpot; of springs that grow harder
 or softer the stiffness that they gain beyond that of small motions (least squares); of all others the rms of force."""
@@ -86,18 +82,20 @@ _AS_GOOD_AS_REST = 1e-4
 """Displacement that counts as a small motion, as a share of the largest."""
 
 
-def size_of_class(kind: str, members: Sequence[Member], motion: Residual, dt: float, units: Units) -> Estimate | None:
+def size_of_class(
+    kind: str, members: Sequence[Member], model: Structure, motion: Residual, dt: float, units: Units
+) -> Estimate | None:
     """Size of what the laws of a class have in common, along the motion of their link.
 
     The value is the mean over members by probability; the interval holds that of every member. None for sensors, and
     where motions cannot be told.
     """
     measure = _OF_CLASS.get(kind, _FORCE)
-    laws = [m for m in members if isinstance(m.trial.parts[m.which], AbstractTerm) and m.probability > 0]
+    laws = [m for m in members if isinstance(m.trial.parts[m.which], AbstractTerm)]
     if not laws:
         return None
     along = motion.displacement, motion.velocity, dt * np.arange(motion.displacement.size)
-    found = np.array([_size(m, measure, *along) for m in laws])
+    found = np.array([_size(m, model, measure, *along) for m in laws])
     if not np.all(np.isfinite(found)):
         return None
     weights = np.array([m.probability for m in laws])
@@ -106,11 +104,13 @@ def size_of_class(kind: str, members: Sequence[Member], motion: Residual, dt: fl
     return Estimate(value, low, high, measure.unit(units))
 
 
-def _size(member: Member, measure: Measure, d: np.ndarray, w: np.ndarray, time: np.ndarray) -> tuple[float, float]:
+def _size(
+    member: Member, model: Structure, measure: Measure, d: np.ndarray, w: np.ndarray, time: np.ndarray
+) -> tuple[float, float]:
     """Size of one law, and its standard error by the covariance of its numbers."""
     t, part = member.trial, member.trial.parts[member.which]
     assert isinstance(part, AbstractTerm)
-    own = [k for k, u in enumerate(t.unknowns) if u.path.startswith(f"{part.kind}@{part.place}.") and u.record is None]
+    own = [k for k in unknowns_of_effect(t, member.which, model) if t.unknowns[k].record is None]
     sd = np.sqrt(np.maximum(np.diag(t.covariance)[own], 0.0))
     steps = np.maximum(_STEP * sd, 1e-6)
     thetas = np.repeat(np.asarray(t.theta, float)[None], len(own) + 1, 0)

@@ -38,9 +38,14 @@ def refitted_values(t: Trial, model: Structure, units: Units) -> dict[str, Estim
 
 def effect_values(t: Trial, which: int, model: Structure, units: Units) -> dict[str, Estimate]:
     """Values of one of a trial's effects, by name."""
-    own, part = set(model.entries()), t.parts[which]
-    paths = [u.path for u in t.unknowns if u.path.startswith(f"{part.kind}@{part.place}.") and u.path not in own]
+    paths = [t.unknowns[k].path for k in unknowns_of_effect(t, which, model)]
     return {name_of(p): estimate(t, p, units) for p in paths}
+
+
+def unknowns_of_effect(t: Trial, which: int, model: Structure) -> list[int]:
+    """Places among a trial's unknowns of the numbers of one of its effects."""
+    own, prefix = set(model.entries()), f"{t.parts[which].kind}@{t.parts[which].place}."
+    return [k for k, u in enumerate(t.unknowns) if u.path.startswith(prefix) and u.path not in own]
 
 
 def all_effect_values(t: Trial, model: Structure, units: Units) -> dict[str, Estimate]:

@@ -99,7 +99,7 @@ def _finding(
         kind_probability=kind_probability,
         law_open=probability < THRESHOLDS.class_named or winner.key in ranked.decision.near,
         members=members,
-        size=size_of_class(kind, likely, missing, nuisances.record.dt, units),
+        size=size_of_class(kind, likely, model, missing, nuisances.record.dt, units),
     )
 
 

@@ -5,15 +5,12 @@ from collections.abc import Iterator, Sequence
 from ...identification import Nuisances
 from ...plant import Channel, Reconstruction
 from ...structures import causes
-from .._diagnosis import Estimate, Finding, Rival
+from .._diagnosis import FOUND, Estimate, Finding, Rival
 from ..channels.clock import Lateness
 from ..evidence.evidence import Setting
 from ..hypotheses.law_classes import DELAY
 from ..thresholds import THRESHOLDS
 from .sentences import finding_sentence
-
-PROBABILITY = 0.99
-"""That a force is late that was found so: its evidence is beyond doubt, and a law that looks like it was tried."""
 
 
 def late_forces(late: Lateness, first: Nuisances, setting: Setting) -> tuple[Finding, ...]:
@@ -24,14 +21,10 @@ def late_forces(late: Lateness, first: Nuisances, setting: Setting) -> tuple[Fin
     if setting.late_changes <= THRESHOLDS.negligible:
         return ()
     cause, responses = causes()["force_delay"], list(first.record.responses)
-    rivals = tuple(Rival("channel_delay", at, 1 - PROBABILITY) for at in responses if len(responses) == 1)
+    rivals = tuple(Rival("channel_delay", at, 1 - FOUND) for at in responses if len(responses) == 1)
 
     def finding(at: Channel, tau: tuple[float, float, float]) -> Finding:
-        size, sentence = Estimate(*tau, "s"), _when(tau[0], first)
-        return Finding(
-            cause.id, cause.family, at, PROBABILITY, {"tau": size}, rivals, sentence, DELAY, PROBABILITY,
-            members={cause.id: PROBABILITY}, size=size,
-        )  # fmt: skip
+        return Finding.of_sensor(cause, at, "tau", Estimate(*tau, "s"), _when(tau[0], first), DELAY, rivals)
 
     return tuple(finding(at, tau) for at, tau in late.items())
 

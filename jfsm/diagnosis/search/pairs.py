@@ -149,7 +149,7 @@ def _held_by(law: AbstractTerm, among: Sequence[Effect]) -> Iterator[tuple[Effec
     for effect in among:
         kind, names = effect.cause.effect, [p.name for p in effect.cause.effect.parameters]
         if effect.at == law.at and kind in law.contains and set(names) <= set(numbers):
-            if effect.cause.sign * float(numbers[names[0]]) >= 0:
+            if effect.cause.has_sign_of(float(numbers[names[0]])):
                 yield effect, kind(**{name: numbers[name] for name in names}, at=effect.at)
 
 

@@ -35,8 +35,8 @@ def special_cases(law: AbstractTerm, begin: Begin, among: Sequence[Candidate]) -
         start = c.starts[0]
         placed = start.terms[-1]
         special = {name: numbers.get(name, value) for name, value in zip(_names(placed), placed.values, strict=True)}
-        if c.effects[0].cause.sign * float(next(iter(special.values()))) < 0:
-            continue  # of the other sign it is another cause
+        if not c.effects[0].cause.has_sign_of(float(next(iter(special.values())))):
+            continue
         start = start.without(placed) + type(placed)(**special, at=placed.at)
         cases.append(replace(c, starts=(start,), begin=begin))
     return cases

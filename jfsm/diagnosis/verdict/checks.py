@@ -1,11 +1,10 @@
 """Every check that a verdict rests on: its stage, what it asks, and the thresholds that limit it."""
 
 from collections.abc import Mapping
-from operator import ge, gt, le, lt
 from typing import Literal, NamedTuple
 
 from ..._result import Check as Check
-from ..._result import Relation
+from ..._result import Relation, holds
 from ...records import LOOKS
 
 Stage = Literal["searched", "sensors", "detected", "admissible", "named", "sufficient", "confirmed"]
@@ -296,11 +295,9 @@ CHECKS: Mapping[str, Kind] = {
 }
 """In the order of the stages."""
 
-_HOLDS = {">=": ge, "<=": le, ">": gt, "<": lt}
-
 
 def checked(name: str, of: str, measured: float, limit: float, says: str, unit: str | None = None) -> Check:
     """The outcome of a check of `CHECKS`, of the hypothesis with the key `of`, in the check's unit or another one."""
     kind = CHECKS[name]
-    passed = bool(_HOLDS[kind.relation](measured, limit))
+    passed = holds(measured, kind.relation, limit)
     return Check(kind.stage, name, of, float(measured), kind.relation, float(limit), unit or kind.unit, passed, says)

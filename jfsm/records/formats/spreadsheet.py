@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from jfsm.records._runs_of import runs_of
 from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, optional_package
 from jfsm.records.formats.headings import headings_of
 from jfsm.records.formats.numbers import decimal_mark, is_gap, is_number, number
@@ -68,10 +69,9 @@ def _tables(rows: Sequence[Row], path: Path) -> list[Contents]:
         return []
     usual = float(np.median([count for count in counts if count]))
     is_data = [count and count >= 0.5 * usual and not _is_heading(row) for count, row in zip(counts, rows, strict=True)]
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], np.array(is_data, dtype=bool), [False]]).astype(int)))
     found: list[Contents] = []
     behind = 0
-    for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for first, end in zip(*(edge.tolist() for edge in runs_of(np.array(is_data, dtype=bool))), strict=True):
         if end - first >= SHORTEST:
             above = [(place + 1, row) for place, row in enumerate(rows[behind:first], start=behind) if _is_filled(row)]
             found.append(_table(rows[first:end], above, first, path))

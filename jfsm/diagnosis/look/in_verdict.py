@@ -3,16 +3,14 @@
 from dataclasses import replace
 
 from ..._result import Estimate
+from ...reporting import capitalised
 from ...structures import Structure, causes
 from .._diagnosis import Finding
 from ..verdict.decision import Decision
 from .looked import MENDED, TURNED, Looked
 
-PROBABILITY = 0.99
-"""That a channel is inverted whose sign is wrong by five standard errors and more."""
 
-
-def beside(decision: Decision, looked: Looked) -> Decision:
+def with_looks(decision: Decision, looked: Looked) -> Decision:
     """The decision with what was looked at before it; a channel of the wrong sign is a cause, whatever else is."""
     verdict = "cause" if looked.inverted else decision.verdict
     stopped = None if looked.inverted else decision.stopped_by
@@ -32,12 +30,8 @@ def _sign_findings(looked: Looked) -> tuple[Finding, ...]:
     for kind, j in looked.inverted:
         law = MENDED[kind].kind
         cause, gain = causes()[law], MENDED[kind].parameters[0].name
-        values = {gain: Estimate(TURNED, TURNED, TURNED, "1")}
-        words = _why(looked, kind, j)
-        found.append(
-            Finding(cause.id, cause.family, (kind, j), PROBABILITY, values, (), words, "a wrong sign", PROBABILITY,
-                    members={cause.id: PROBABILITY}, size=values[gain])
-        )  # fmt: skip
+        size = Estimate(TURNED, TURNED, TURNED, "1")
+        found.append(Finding.of_sensor(cause, (kind, j), gain, size, _why(looked, kind, j), "a wrong sign"))
     return tuple(found)
 
 
@@ -54,12 +48,12 @@ def mended_model(structure: Structure, looked: Looked) -> Structure:
     return structure
 
 
-def told(sentence: str, looked: Looked, advice: str) -> tuple[str, str]:
+def in_words(sentence: str, looked: Looked, advice: str) -> tuple[str, str]:
     """Sentence and advice of a verdict with what was seen before it."""
     if looked.inverted:
         wrong = " ".join(dict.fromkeys(f"{_why(looked, *channel)}." for channel in looked.inverted))
         turns = "".join(f".turned({channel!r})" for channel in looked.inverted)
-        sentence = f"{wrong[0].upper()}{wrong[1:]} With the sign turned: {sentence}"
+        sentence = f"{capitalised(wrong)} With the sign turned: {sentence}"
         advice = f"Turn the sign: record{turns}. {advice}"
     if looked.undriven:
         sentence = f"{sentence} Without a measured force the motion does not decay: {looked.undriven}."
