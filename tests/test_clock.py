@@ -31,10 +31,18 @@ def force_at(t: Any) -> Any:
     return 3.0 * np.cos(np.multiply.outer(t, omegas) + phases).sum(-1)
 
 
+def single_line(t: Any) -> Any:
+    return 5.0 * np.cos(4.0 * t + 1.0)
+
+
 def recorded(
-    acting: Callable[[float], float], masses: int = 1, kinds: tuple[str, ...] = ("displacement",), cubic: float = 0.0
+    acting: Callable[[float], float],
+    masses: int = 1,
+    kinds: tuple[str, ...] = ("displacement",),
+    cubic: float = 0.0,
+    told: Callable[[Any], Any] = force_at,
 ) -> jfsm.Record:
-    """A noisy record of a chain at rest under a force on its last mass that acts so, recorded as `force_at` has it."""
+    """A noisy record of a chain at rest under a force on its last mass that acts so, recorded as it is `told`."""
     m, c, k = MASS[:masses], DAMPING[:masses], STIFFNESS[:masses]
 
     def rates(t: float, y: np.ndarray) -> np.ndarray:
@@ -57,7 +65,7 @@ def recorded(
         kind: {j + 1: y + NOISE * y.std() * rng.standard_normal(N) for j, y in enumerate(clean[kind].T)}
         for kind in kinds
     }
-    return jfsm.Record(TIME, force={masses: force_at(TIME)}, at_rest=True, **noisy)
+    return jfsm.Record(TIME, force={masses: told(TIME)}, at_rest=True, **noisy)
 
 
 def late(samples: float) -> Callable[[float], float]:
@@ -107,6 +115,12 @@ def test_a_force_in_time_stays_as_it_was_recorded():
     given, refitted = fit_model(problem)
     assert in_its_time(refitted, problem, to_noise=True) is None and lateness(refitted, problem) == {}
     assert change_by_times(given.structure, problem.first, "band-limited") == 0.0
+
+
+def test_a_single_line_shows_no_late_force():
+    record = recorded(lambda t: float(single_line(t - 0.5 * STEP)), told=single_line)
+    problem = problem_of(record, chain())
+    assert in_its_time(fit_model(problem)[1], problem, to_noise=False) is None
 
 
 def test_a_response_that_is_late_among_others_is_not_the_force():

@@ -11,6 +11,7 @@ from ...plant import Channel, InterpolatedInput, Reconstruction
 from ...structures import ForceDelay, Structure
 from ..evidence.excess import explained, is_noise_only
 from ..evidence.fitted import Trial, trial
+from ..evidence.identifiable import single_line
 from ..evidence.setup import Problem
 from ..thresholds import THRESHOLDS
 from .delays import likeliest_delay
@@ -45,7 +46,7 @@ def in_its_time(beside: Trial, problem: Problem, *, to_noise: bool) -> Problem |
     """The problem in which the force acts otherwise, where that is far likelier beside a trial; None elsewhere.
 
     It has to explain nearly all of what the trial leaves, or leave noise alone, as it must with `to_noise`: what a
-    model lacks may look like a late force, and so may one late response of two.
+    model lacks may look like a late force, and so may one late response of two. A single line does not show it.
     """
     ways = _worth_a_fit(beside, problem)
     found = [] if problem.limit.over else [one for way in ways for one in _fitted(beside, problem, way)]
@@ -85,7 +86,7 @@ def lateness(t: Trial, problem: Problem, assumed: Reconstruction = WAYS[0]) -> L
 
 def _worth_a_fit(beside: Trial, problem: Problem) -> list[_Way]:
     """The ways that promise most beside a trial, where they promise enough."""
-    if not problem.ways or not _forces(beside.structure, problem.first):
+    if not problem.ways or not _forces(beside.structure, problem.first) or single_line(problem.records) is not None:
         return []
     ways = [way for name in problem.ways for way in _promises(beside, problem, name)]
     least = max(THRESHOLDS.searched, _WORTH_A_FIT * max(way.promise for way in ways))

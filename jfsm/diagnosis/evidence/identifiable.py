@@ -1,8 +1,8 @@
 """What the motion of a single record cannot tell apart, however large the difference in evidence.
 
 In one decay amplitude goes with time. Under one steady line whatever a law does goes with that line and its overtones,
-as a load of that frequency would. And a load of the line itself takes the place of the measured force without that
-one's noise, so that it is the more probable whatever the cause is.
+as a load of that frequency would, and a delay of the force does what own values do. And a load of the line itself takes
+the place of the measured force without that one's noise, so that it is the more probable whatever the cause is.
 """
 
 from collections.abc import Callable, Sequence
@@ -38,7 +38,7 @@ def in_step(records: Sequence[Nuisances]) -> Callable[[Trial], bool]:
 
 def _orders(records: Sequence[Nuisances]) -> Callable[[AbstractTerm], int]:
     """Tells of a law which overtone of a single line its frequency is; 0 for none, or where there is no such line."""
-    line = _single_line(records[0]) if len(records) == 1 and records[0].path is None else None
+    line = single_line(records)
     if line is None:
         return lambda law: 0
     bin_width = 2 * np.pi / records[0].record.duration
@@ -51,8 +51,11 @@ def _orders(records: Sequence[Nuisances]) -> Callable[[AbstractTerm], int]:
     return order_of
 
 
-def _single_line(nuisances: Nuisances) -> float | None:
-    """Angular frequency [rad/s] of a drive that is a single line; None where there is more to it, or no drive."""
+def single_line(records: Sequence[Nuisances]) -> float | None:
+    """Angular frequency [rad/s] of the only line that drives a single record; None where there is more, or no drive."""
+    if len(records) > 1 or records[0].path is not None:
+        return None
+    nuisances = records[0]
     forces = [y - np.mean(y) for (kind, _), y in nuisances.record.channels.items() if kind == "force"]
     if nuisances.record.base_acceleration is not None:
         forces.append(nuisances.record.base_acceleration - np.mean(nuisances.record.base_acceleration))
