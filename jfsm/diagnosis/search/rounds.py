@@ -74,7 +74,7 @@ class Rounds:
         found = self._related(found)
         refitted = refit_from(found.trials, self.refitted, self.problem)
         louder, (given, refitted, *trials) = amid_noise(self.given, refitted, found.trials, self.problem, self.key)
-        singles = Searched(given, refitted, trials, found.behind, left_out, LackOfFit(self.problem))
+        singles = Searched(given, refitted, trials, found.behind, left_out, self._lack)
         if self._limit.over:
             return singles, None
         best = self._likeliest(singles.every)
@@ -90,6 +90,10 @@ class Rounds:
     @property
     def _limit(self) -> Limit:
         return self.problem.limit
+
+    @cached_property
+    def _lack(self) -> LackOfFit:
+        return LackOfFit(self.problem)
 
     @cached_property
     def _takes_the_drives_place(self) -> Callable[[Trial], bool]:
@@ -136,7 +140,7 @@ class Rounds:
     ) -> tuple[Found, list[Candidate]]:
         """What else is fitted. Once the best leaves only noise, that is what may be as good; else all of it, since
         regression may put the right law last if the missing force is poorly seen."""
-        if not settled(self._apart_from_the_drive([self.given, self.refitted, *found.trials])):
+        if not settled(self._apart_from_the_drive([self.given, self.refitted, *found.trials]), self._lack):
             return found, [c for c in others if c.starts] + slow
         best = max(found.trials, key=lambda t: t.evidence)
         late, behind = self._not_far_behind(late, best)
