@@ -11,11 +11,14 @@ from scipy.integrate import solve_ivp
 from test_verdict import evidence_of, given, refit
 
 import jfsm
+from jfsm._limit import UNLIMITED
 from jfsm.diagnosis import Evidence, judge
 from jfsm.diagnosis.channels.clock import WAYS, in_its_time, lateness
 from jfsm.diagnosis.evidence.as_recorded import change_by_times
 from jfsm.diagnosis.evidence.setup import Problem
 from jfsm.diagnosis.search.baseline import fit_model
+from jfsm.diagnosis.search.steps import Steps
+from jfsm.diagnosis.search.study import Study
 from jfsm.identification import prepare_all
 
 N, STEP, NOISE = 1200, 0.04, 0.002
@@ -170,6 +173,19 @@ def test_a_force_that_is_hardly_late_is_said_and_no_cause():
     d = jfsm.diagnose(recorded(late(0.02)), chain(), causes=TRIED, key=jax.random.key(0))
     assert d.verdict == "consistent" and not d.findings
     assert any("later than it was recorded" in note for note in d.notes)
+
+
+def test_a_delay_that_was_no_candidate_is_tried_where_the_force_turns_out_to_be_in_time():
+    record, model = recorded(late(0.0)), chain()
+    chosen = {name: jfsm.structures.causes()[name] for name in TRIED}
+    study = Study(model, chosen, None, None, jax.random.key(0), Steps(None, 4), UNLIMITED, False)
+    problem, channel = problem_of(record, model), ("force", 1)
+    timed = problem.timed("band-limited", {channel: 0.01})
+    tried = [[(c.effects[0].cause.id, c.effects[0].at) for c in study._candidates(p)] for p in (problem, timed)]
+    assert ("force_delay", channel) in tried[0] and ("force_delay", channel) not in tried[1]
+    (untried,) = study._delays(problem, timed)
+    assert (untried.effects[0].cause.id, untried.effects[0].at) == ("force_delay", channel)
+    assert study._delays(problem, problem) == study._delays(timed, timed) == []
 
 
 @pytest.mark.slow
