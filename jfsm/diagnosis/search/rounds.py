@@ -233,7 +233,7 @@ class Rounds:
             return None
         found = search_beside(best, other, sensor, self.problem, self.steps.of("what is late"))
         slight = slightly_late(found.trials, {}, self.problem.first.record)
-        return found if slight and settled(found.trials) else None
+        return found if slight and settled(found.trials, self._lack) else None
 
 
 def amid_noise(
