@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfilt
+from scipy.signal import butter, lsim, sosfilt
 
 from jfsm.records import Record, look, mended, span_of_motion
 
@@ -71,13 +71,20 @@ def test_a_stretch_in_which_a_sensor_hung_is_left_out_also_where_the_record_is_c
 def test_of_a_channel_that_is_constant_its_name_and_value_are_said():
     says = failed(Record(T, force=noisy(WAVE), displacement=np.full(T.size, 1e-3)))["channel_moves"]
     assert says.startswith("displacement 1 is constant (0.001 m): nothing was measured there")
-    assert "channel_moves" not in failed(Record(T, force=np.full(T.size, 9.81), displacement=noisy(WAVE)))
 
 
 def decay(until: float, creep: float) -> np.ndarray:
     """Friction stops a swing at an instant; then the sensor creeps."""
     shrinking = np.maximum(1.0 - T / until, 0.0) * np.cos(30.0 * T)
     return shrinking + creep * T / T[-1] + 1e-4 * RNG.standard_normal(T.size)
+
+
+@pytest.mark.parametrize(("pushed", "dead"), [(9.0, {"channel_moves", "drive_measured"}), (0.0, set())])
+def test_a_constant_force_is_dead_where_the_motion_goes_on_and_a_load_where_it_decays(pushed: float, dead: set[str]):
+    push = pushed * (np.sin(15.0 * T) + np.sin(20.0 * T))
+    system = ([[0.0, 1.0], [-300.0, -1.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]])
+    x = lsim(system, push, T, [0.0 if pushed else 0.1, 0.0])[1]
+    assert set(failed(Record(T, force=np.full(T.size, 0.3), displacement=noisy(x)))) == dead
 
 
 @pytest.mark.parametrize("creep", [0.0, 0.004, -0.01])

@@ -6,7 +6,7 @@ from functools import cache
 import jax
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfilt
+from scipy.signal import butter, lsim, sosfilt
 
 import jfsm
 from jfsm.diagnosis import Evidence, judge
@@ -208,3 +208,17 @@ def test_a_diagnosis_refuses_a_dead_channel_by_name():
     record = jfsm.Record(T, force=drive(), displacement=np.full(T.size, 1e-3))
     with pytest.raises(ValueError, match=r"displacement 1 is constant \(0.001 m\): nothing was measured there"):
         jfsm.diagnose(record, model_of(*ONE))
+
+
+@pytest.mark.parametrize(
+    ("rate", "upto", "factor", "words"), [(500.0, 20.0, 1 / 9.80665, "g for m/s²"), (50.0, 7.5, 180 / np.pi, "degrees")]
+)
+def test_a_factor_is_told_by_few_periods_whose_lines_lie_close_to_the_mode(rate, upto, factor, words):
+    rng, t = np.random.default_rng(18), np.arange(2000) / rate
+    force = 20.0 * sosfilt(butter(4, upto, fs=rate, output="sos"), rng.standard_normal(t.size))
+    k = 900.0 if rate > 100 else 250.0
+    _, y, _ = lsim(([[0.0, 1.0], [-k, -1.0]], [[0.0], [1.0]], [[1.0, 0.0], [-k, -1.0]], [[0.0], [1.0]]), force, t)
+    shown = {"acceleration": factor * y[:, 1]} if factor < 1 else {"displacement": factor * y[:, 0]}
+    record = jfsm.Record(t, force=force, **{kind: noisy(each, 3) for kind, each in shown.items()})
+    with pytest.raises(ValueError, match=words):
+        looked_at([record], jfsm.Structure.sdof(mass=1.0, stiffness=k, damping=1.0))

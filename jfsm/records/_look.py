@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jfsm._result import Check, Relation, holds
 from jfsm.records._abstract_record import AbstractRecord
@@ -129,7 +130,10 @@ def look(record: AbstractRecord) -> Look:
     for check in pushes:
         if not check.passed:
             inverted = _with_force(inverted, int(check.of.split()[1]), moving)
-    checks += _undriven(moving)
+    undriven = [*_undriven(moving)]
+    checks += undriven
+    if not all(check.passed for check in undriven):
+        checks += _dead_forces(record)
     return Look(tuple(checks), span, pairs, tuple(dict.fromkeys(inverted)))
 
 
@@ -145,17 +149,28 @@ def is_constant(y: np.ndarray) -> bool:
 
 
 def _dead(record: AbstractRecord) -> Iterator[Check]:
-    """A constant force is a load; a channel that has to be predicted is dead."""
-    judged = {**record.responses, **record.answers}
-    for (kind, j), y in judged.items():
-        unit, extent = record.units[kind], float(np.ptp(y))
-        says = f"{kind} {j} moves by {extent:.4g} {unit}"
-        if is_constant(y):
-            says = (
-                f"{kind} {j} is constant ({y[0]:.4g} {unit}): nothing was measured there. Leave the channel out of the "
-                f"record, or mend its sensor"
-            )
-        yield _checked("channel_moves", f"{kind} {j}", extent, FLAT * float(np.max(np.abs(y))), says)
+    """A constant force may be a load; a channel that has to be predicted is dead."""
+    for channel, y in {**record.responses, **record.answers}.items():
+        yield _moves(record, channel, y)
+
+
+def _dead_forces(record: AbstractRecord) -> Iterator[Check]:
+    """Where the motion goes on, a constant force is no load: it does not drive it."""
+    for channel, y in record.channels.items():
+        if channel[0] == "force" and np.any(y) and is_constant(y):
+            yield _moves(record, channel, y)
+
+
+def _moves(record: AbstractRecord, channel: tuple[str, int], y: NDArray[np.float64]) -> Check:
+    kind, j = channel
+    unit, extent = record.units[kind], float(np.ptp(y))
+    says = f"{kind} {j} moves by {extent:.4g} {unit}"
+    if is_constant(y):
+        says = (
+            f"{kind} {j} is constant ({y[0]:.4g} {unit}): nothing was measured there. Leave the channel out of the "
+            f"record, or mend its sensor"
+        )
+    return _checked("channel_moves", f"{kind} {j}", extent, FLAT * float(np.max(np.abs(y))), says)
 
 
 def _torn(record: AbstractRecord) -> Iterator[Check]:
@@ -291,7 +306,7 @@ def _undriven(record: AbstractRecord) -> Iterator[Check]:
     """Whether a motion that nothing measured drives decays."""
     if record.drive == "motion" or record.base_acceleration is not None or not record.responses:
         return
-    forces = [y for (kind, _), y in record.channels.items() if kind == "force" and np.any(y)]
+    forces = [y for (kind, _), y in record.channels.items() if kind == "force" and not is_constant(y)]
     if any(rough_noise(y) ** 2 < CLEAR * np.var(y) for y in forces):
         return  # as most are: the noise need not be known well
     if len(silent_forces(record)) < len(forces):

@@ -60,7 +60,7 @@ def single_line(records: Sequence[Nuisances]) -> float | None:
     if nuisances.record.base_acceleration is not None:
         forces.append(nuisances.record.base_acceleration - np.mean(nuisances.record.base_acceleration))
     found = []
-    for y in forces:
+    for y in filter(np.any, forces):
         power = np.abs(np.fft.rfft(np.hanning(y.size) * y)) ** 2
         k = int(np.argmax(power[1:])) + 1
         near = slice(max(k - 2, 1), k + 3)

@@ -18,8 +18,6 @@ _CLEAR = 50.0
 """Power over noise from which a line takes part."""
 _COHERENT = 0.5
 """Coherence over the pieces from which a line tells a ratio."""
-_BESIDE = 1.4
-"""Times below and above a mode from which a line lies beside it."""
 _LONGEST = 2000
 """Samples of a piece, at most,"""
 _PERIODS = 8
@@ -28,8 +26,8 @@ _PERIODS = 8
 
 class Ratio(NamedTuple):
     """A channel over what the model makes of it: by how many times, the spread of that over the lines of the spectrum
-    as a logarithm, the cosine of the phase between them, and whether the lines lie on both sides of the model's lowest
-    mode, so that stiffness and mass both show."""
+    as a logarithm, the cosine of the phase between them, and whether the lines lie on both sides of the model's
+    lowest mode, so that stiffness and mass both show."""
 
     times: float
     spread: float
@@ -106,7 +104,7 @@ def ratio_of(seen: np.ndarray, expected: np.ndarray, omega: np.ndarray, mode: fl
     size = np.log(np.abs(ratio))
     low, middle, high = np.quantile(size, [0.25, 0.5, 0.75])
     lines = omega[used][coherent]
-    wide = bool(lines.min() < mode / _BESIDE and lines.max() > mode * _BESIDE)
+    wide = bool(lines.min() < mode < lines.max())
     return Ratio(float(np.exp(middle)), float(high - low) / 1.35, float(np.median(ratio.real / np.abs(ratio))), wide)
 
 
