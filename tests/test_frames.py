@@ -102,7 +102,7 @@ def test_other_tables_are_read_alike(make):
 
 def test_a_series_is_a_channel():
     record = read(pd.Series(F, index=pd.Index(T), name="F [kN]"), force="F")
-    np.testing.assert_allclose(record.force[:, 0], 1e3 * F)
+    np.testing.assert_allclose(record.channels["force", 1], 1e3 * F)
 
 
 def test_a_dataset_has_clocks_and_units_in_its_coordinates():
@@ -138,7 +138,7 @@ def test_columns_of_dates_that_begin_apart_are_not_put_side_by_side(tmp_path):
 
 def test_a_data_array_is_a_channel():
     record = read(xr.DataArray(F, {"t": T}, name="F", attrs={"units": "kN"}), force="F")
-    np.testing.assert_allclose(record.force[:, 0], 1e3 * F)
+    np.testing.assert_allclose(record.channels["force", 1], 1e3 * F)
     np.testing.assert_allclose(record.time, T)
 
 
@@ -158,7 +158,7 @@ def test_a_frame_given_out_is_taken_back(time):
 
 def test_a_list_of_channels_is_read_as_such():
     record = read([{"name": "F", "data": F, "unit_str": "kN", "fs": 200}], force="F")
-    np.testing.assert_allclose(record.force[:, 0], 1e3 * F)
+    np.testing.assert_allclose(record.channels["force", 1], 1e3 * F)
 
 
 def test_what_is_no_source_is_refused():

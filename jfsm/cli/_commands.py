@@ -54,7 +54,6 @@ def simulate(
     With --drive motion, the force that the record's motion needs.
     """
     from ..dynamics import simulate
-    from ..records import Record
 
     check_outputs({"--out": out}, [source.record, model])
     record = source.read()
@@ -62,19 +61,7 @@ def simulate(
     if not response.result.ok:
         say(f"At t = {response.escape_time:.6g} s {response.result.value}. Nothing was written.")
         raise typer.Exit(NOT_FINISHED)
-    forces = {dof: samples for (kind, dof), samples in record.channels.items() if kind == "force"}
-    Record(
-        response.time,
-        force=(forces or None) if response.force is None else response.force,
-        displacement=response.displacement,
-        velocity=response.velocity,
-        acceleration=response.acceleration,
-        base_acceleration=record.base_acceleration,
-        units=record.units,
-        at_rest=record.at_rest,
-        drive=record.drive,
-        name=f"{record.name}, simulated",
-    ).write(out)
+    response.to_record().write(out)
     what = "motion" if response.force is None else "force of the motion"
     typer.echo(f"The {what} of {len(response.time)} samples is in {out}.")
 

@@ -352,7 +352,10 @@ def _apart(one: Clock, other: Clock) -> str:
     """How far apart two clocks begin, if the file states from when they count."""
     if one.begins is None or other.begins is None or not one.seconds.size or not other.seconds.size:
         return ""
-    starts = [clock.begins + np.timedelta64(round(float(clock.seconds[0]) * _NS), "ns") for clock in (one, other)]
+    starts = [
+        begins + np.timedelta64(round(float(clock.seconds[0]) * _NS), "ns")
+        for clock, begins in ((one, one.begins), (other, other.begins))
+    ]
     begun = " and ".join(str(start).replace("T", " ") for start in starts)
     return f"They begin at {begun}, {abs((starts[1] - starts[0]) / np.timedelta64(1, 'ns')) / _NS:.9g} s apart. "
 

@@ -157,9 +157,7 @@ def _of_arrow(table: Any) -> Contents:
 
 
 def _contents(table: _Table) -> Contents:
-    headings = (
-        headings_of(table.headings, len(table.headings[0])) if table.headings[0] else Headings([], {}, {}, set(), [])
-    )
+    headings = headings_of(table.headings, len(table.headings[0]))
     places = {name: place for place, name in enumerate(headings.names)}
     numbers, texts, neither = _sorted(places, table.column)
     aliases = dict(headings.aliases)
