@@ -77,8 +77,8 @@ class FakeDiagnosis(SimpleNamespace):
 
     finished = True
 
-    def print(self) -> None:
-        print(f"verdict: {self.verdict}")
+    def print(self, units: Any = None) -> None:
+        print(f"verdict: {self.verdict}{f' in {units}' if units else ''}")
 
 
 def answer(monkeypatch, verdict: str = "consistent") -> dict[str, Any]:
@@ -117,6 +117,21 @@ def test_of_a_record_the_part_between_two_instants_is_read(channels):
     result = run("inspect", *channels, "--since", 1000.0)
     assert result.exit_code == 2
     assert "`since` and `until` must keep at least 2 samples" in flat(result.stderr)
+
+
+def test_results_are_shown_in_the_units_that_are_asked_for(channels, folder, tmp_path, monkeypatch):
+    page, table = tmp_path / "page.html", re.compile(r"displacement 1 +in\b")
+    result = run("inspect", *channels, "--out-units", "in,lbf", "--report", page)
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert table.search(result.stdout) and re.search(r"force 1 +lbf\b", result.stdout) and ">lbf<" in page.read_text()
+    result = run("inspect", *channels, "--out-units", "given")
+    assert re.search(r"displacement 1 +mm\b", result.stdout)
+    assert "--out-units must be units of length" in refusal("inspect", *channels, "--out-units", "furlong")
+    answer(monkeypatch)
+    result = run("diagnose", *channels, "--model", folder / "model.toml", "--out-units", "in,lbf")
+    assert "consistent in in,lbf" in result.stdout
+    text = refusal("diagnose", *channels, "--model", folder / "model.toml", "--out-units", "in,mm")
+    assert "in and mm both stand for m" in text
 
 
 def test_an_inspection_is_written_as_a_page(channels, tmp_path):
@@ -454,12 +469,19 @@ def test_a_motion_that_runs_away_is_not_written(folder, channels, tmp_path):
 def test_a_fit_is_printed_with_intervals_and_written_as_a_model(channels, folder, tmp_path):
     out = tmp_path / "fitted.toml"
     given = Structure.load(folder / "stiff.toml").values()
-    result = run("fit", *channels, "--at-rest", "--model", folder / "stiff.toml", "--out", out, "--fixed", "mass")
+    command = ("fit", *channels, "--at-rest", "--model", folder / "stiff.toml", "--out", out, "--fixed", "mass")
+    result = run(*command, "--out-units", "in")
     assert (result.exit_code, result.stderr) == (0, "")
     fitted = Structure.load(out).values()
     assert fitted["mass@1"] == given["mass@1"]
     assert fitted["stiffness@0-1.k"] == pytest.approx(STIFFNESS, rel=0.01)
-    assert "stiffness@0-1.k" in result.stdout and "N/m" in result.stdout and "mass@1" not in result.stdout
+    assert "stiffness@0-1.k" in result.stdout and "mass@1" not in result.stdout
+    shown = re.search(r"stiffness@0-1\.k +\S+ +(\S+) .*N/in", result.stdout)
+    assert shown and float(shown[1]) == pytest.approx(STIFFNESS * 0.0254, rel=0.01)
+    hertz = re.search(r"mode 1, frequency +(\S+) .*Hz", result.stdout)
+    assert hertz and float(hertz[1]) == pytest.approx(math.sqrt(STIFFNESS / MASS) / (2 * math.pi), rel=0.005)
+    share = re.search(r"mode 1, damping ratio +(\S+) .*%", result.stdout)
+    assert share and float(share[1]) == pytest.approx(50 * DAMPING / math.sqrt(STIFFNESS * MASS), rel=0.1)
 
 
 def test_a_name_that_cannot_be_fixed_is_refused(channels, folder, tmp_path):

@@ -14,7 +14,7 @@ import typer
 if TYPE_CHECKING:
     import jax
 
-    from ..records import Record
+    from ..records import OutUnits, Record
     from ..structures import Structure
 
 
@@ -37,6 +37,10 @@ Where = Annotated[
     list[str] | None, option("Rows of a long table to take, as run=3; once per column.", "NAME=VALUE", CHANNELS)
 ]
 Rate = Annotated[float | None, option("Samples per second of a file without a clock.", "HZ", CHANNELS)]
+ShownUnits = Annotated[
+    str | None,
+    option("Show results in these units, as in,lbf,deg, or in those of the record (given).", "UNITS|given"),
+]
 ModelFile = Annotated[Path, option("The model that is believed, as TOML.")]
 Seed = Annotated[int | None, option("Seed of the few random draws; without it, another one every time.")]
 
@@ -232,6 +236,7 @@ def in_options(message: str) -> str:
 
 _KINDS = "force|displacement|velocity|acceleration"
 _IN_OPTIONS = (
+    (r"`units` to show results in", "--out-units"),
     (r"\bunits=\{'([^']*)': '([^']*)'\}", r"--unit '\1=\2'"),
     (r"\bunits=\{'([^']*)': \.\.\.\}", r"--unit '\1=UNIT'"),
     (r"\btime='([^']*)'", r"--time '\1'"),
@@ -280,3 +285,12 @@ def _where(given: Sequence[str] | None) -> dict[str, str | float] | None:
         except ValueError:
             found[name] = value
     return found or None
+
+
+def shown_units(text: str | None, record: "Record | None" = None) -> "OutUnits":
+    """Units to show results in: those that are asked for, or those that the record came in; checked."""
+    from ..records import out_units
+
+    asked = record.written if text == "given" and record is not None else text
+    out_units(asked)
+    return asked

@@ -52,7 +52,7 @@ class AbstractRecord:
         self._time = as_time(time, factors.pop("time", 1.0))
         stated.pop("time", None)
         self._units = dict(coherent_units(stated))
-        self._stated = frozenset(stated)
+        self._written = {kind: str((units or {})[kind]) for kind in stated}
         given = {"force": force, "displacement": displacement, "velocity": velocity, "acceleration": acceleration}
         self._columns: dict[str, Columns] = {
             kind: as_columns(kind, samples, self._time, factors.get(kind, 1.0))
@@ -130,7 +130,12 @@ class AbstractRecord:
     @property
     def stated(self) -> frozenset[str]:
         """Kinds of channel whose unit was stated; that of the others was assumed."""
-        return self._stated
+        return frozenset(self._written)
+
+    @property
+    def written(self) -> Mapping[str, str]:
+        """The unit in which the numbers of each kind of channel came, where one was stated: what `units` says is SI."""
+        return MappingProxyType(self._written)
 
     @property
     def dofs(self) -> int:
