@@ -24,7 +24,7 @@ from ._input import (
     takes_record,
     units,
 )
-from ._output import progress, say, show_table
+from ._output import progress, said_in_options, say, show_listing, show_table
 
 if TYPE_CHECKING:
     import jax
@@ -40,13 +40,20 @@ def inspect(
     report: Annotated[Path | None, option("Write the page here, as HTML.")] = None,
     out_units: ShownUnits = None,
 ) -> None:
-    """Show what a record holds, and what is odd about it."""
+    """Show what a record holds, and what is odd about it; of a file whose channels have no kinds, the channels."""
     check_outputs({"--report": report}, [source.record])
+    if (found := source.listing(source.record)) is not None:
+        if report is not None:
+            raise ValueError(f"--report needs channels: {source.proposal('inspect', found.proposed)}")
+        show_listing(found, source.proposal("diagnose", found.proposed))
+        return
     record = source.read()
     units, inspection = shown_units(out_units, record), record.inspect()
     if report is not None:
         inspection.report(report, units)
-    inspection.print(units)  # last, so that a reader who closes the pipe loses no file
+    with said_in_options():
+        inspection.print(units)  # last, so that a reader who closes the pipe loses no file
+    typer.echo(f"To go on: {source.proposal('diagnose')}")
 
 
 @command
@@ -175,7 +182,8 @@ def diagnose(
         d.to_json(json)
     if extended is not None:
         d.extended.save(extended)
-    d.print(units)  # last, so that a reader who closes the pipe loses no file
+    with said_in_options():
+        d.print(units)  # last, so that a reader who closes the pipe loses no file
     if why:
         typer.echo(d.why())
     if not d.finished:
@@ -215,7 +223,8 @@ def map(
         found.force_map.save(out)
     if report is not None:
         found.report(report, units)
-    found.print(units)  # last, so that a reader who closes the pipe loses no file
+    with said_in_options():
+        found.print(units)  # last, so that a reader who closes the pipe loses no file
 
 
 @command

@@ -9,6 +9,8 @@ from jfsm.records._defects import bridged as bridged
 from jfsm.records._defects import clipped as clipped
 from jfsm.records._defects import defects as defects
 from jfsm.records._defects import spikes as spikes
+from jfsm.records._listing import Listing as Listing
+from jfsm.records._listing import listing as listing
 from jfsm.records._look import LOOKS as LOOKS
 from jfsm.records._look import Look as Look
 from jfsm.records._look import is_constant as is_constant

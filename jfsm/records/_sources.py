@@ -20,7 +20,7 @@ def record_from(
     make: type[AnyRecord], source: Any, asked: Asked, where: Mapping[str, str | float] | None = None, sheet: Run = None
 ) -> AnyRecord:
     """A `make`, the class of the record, from whatever holds its channels; errors are those of `read`."""
-    contents, called, default_name = _opened(source)
+    contents, called, default_name = opened(source)
     contents, run = chosen_run(contents, called, asked.run, sheet)
     return record_of(
         make,
@@ -31,7 +31,7 @@ def record_from(
     )
 
 
-def _opened(source: Any) -> tuple[Contents, str, str | None]:
+def opened(source: Any) -> tuple[Contents, str, str | None]:
     """What a source holds, what messages call it, and the name of a record of it."""
     if isinstance(source, str | PathLike):
         path = Path(source)

@@ -1,7 +1,7 @@
 """Results in other units than those of the record: numbers with their units, and numbers in sentences."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
@@ -10,6 +10,7 @@ Units = Mapping[str, tuple[float, str]]
 """Size in SI and word of the unit that takes the place of a coherent one, or of a symbol in it."""
 
 _shown: ContextVar[Units | None] = ContextVar("shown", default=None)
+_said: ContextVar[Callable[[str], str] | None] = ContextVar("said", default=None)
 
 _SYMBOL = re.compile(r"(?P<word>[A-Za-zµ°]+)(?:\^(?P<power>-?\d+)|(?P<raised>[²³⁴⁵]))?")
 _OPEN_POWER = re.compile(r"\^\(?-?[A-Za-z]")  # an exponent that is a number of its own: the factor is not known
@@ -34,6 +35,16 @@ def shown_in(units: Units) -> Iterator[None]:
         yield
     finally:
         _shown.reset(token)
+
+
+@contextmanager
+def said_as(words: Callable[[str], str]) -> Iterator[None]:
+    """Every sentence that is shown meanwhile is put into these words first."""
+    token = _said.set(words)
+    try:
+        yield
+    finally:
+        _said.reset(token)
 
 
 def in_shown_unit(unit: str) -> tuple[float, str]:
@@ -67,10 +78,12 @@ def in_shown_unit(unit: str) -> tuple[float, str]:
 
 def in_shown_words(told: Any) -> Any:
     """A dictionary of results whose sentences have their numbers in the units that are shown; others as they are."""
-    if not _shown.get():
+    words = _said.get()
+    if not _shown.get() and words is None:
         return told
     if isinstance(told, str):
-        return _IN_WORDS.sub(_translated, told)
+        told = told if words is None else words(told)
+        return _IN_WORDS.sub(_translated, told) if _shown.get() else told
     if isinstance(told, Mapping):
         return {key: value if key in _NAMES else in_shown_words(value) for key, value in told.items()}
     if isinstance(told, list | tuple) and not (told and isinstance(told[0], float)):
