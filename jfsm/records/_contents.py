@@ -42,6 +42,8 @@ def contents_of(record: AbstractRecord) -> Contents:
         "name": record.name,
         "notes": list(record._notes),
     }
+    if record.begins is not None:
+        about["begins"] = str(record.begins)
     return Contents(arrays, units, about)
 
 
@@ -90,6 +92,7 @@ def record_of(
         name=contents.about.get("name", default_name) if asked.name is None else asked.name,
     )
     notes = [*contents.about.get("notes", ()), *contents.notes, *clock.notes]
+    begins = contents.about.get("begins") if clock.begins is None else clock.begins
     if clock.begins is not None:
         notes.append(f"The clock reads zero at {str(clock.begins).replace('T', ' ')}.")
     notes += [*told, *_of_units(scales, record.units, said=not contents.about)]
@@ -97,7 +100,7 @@ def record_of(
     if not named and contents.points and not contents.about:
         numbered = (f"{dof} is {point_name(*point)}" for point, dof in dofs_of_points(contents).items())
         notes.append(f"Degrees of freedom by node and direction: {', '.join(numbered)}.")
-    return record.noted(*notes)
+    return record.dated(None if begins is None else str(begins)).noted(*notes)
 
 
 class _Scale(NamedTuple):
