@@ -72,10 +72,7 @@ def record_of(
 
     Errors are those of `read`.
     """
-    named = {kind: names for kind, names in zip(KINDS, asked.wanted, strict=True) if names is not None}
-    chosen = {
-        kind: _by_dof(contents, source, kind, names) for kind, names in (named or own_names(contents, source)).items()
-    }
+    chosen = {kind: _by_dof(contents, source, kind, names) for kind, names in _names(contents, source, asked).items()}
     every = [choice for choices in chosen.values() for choice in choices.values()]
     units, sensitivity = asked.units or {}, asked.sensitivity or {}
     clock = clock_of(contents, source, every, asked.time, asked.rate, units)
@@ -87,20 +84,41 @@ def record_of(
         clock.seconds[part],
         **{kind: _samples(contents, source, choices, clock, scales, part) for kind, choices in chosen.items()},
         units=_one_for_each_kind(source, {choice: scale.unit for choice, scale in scales.items()}),
-        at_rest=contents.about.get("at_rest", False) if asked.at_rest is None else asked.at_rest,
-        drive=asked.drive or contents.about.get("drive", "force"),
-        name=contents.about.get("name", default_name) if asked.name is None else asked.name,
+        **_of_the_whole(contents, asked, default_name),
     )
-    notes = [*contents.about.get("notes", ()), *contents.notes, *clock.notes]
-    begins = contents.about.get("begins") if clock.begins is None else clock.begins
-    if clock.begins is not None:
-        notes.append(f"The clock reads zero at {str(clock.begins).replace('T', ' ')}.")
-    notes += [*told, *_of_units(scales, record.units, said=not contents.about)]
+    notes = [*contents.about.get("notes", ()), *contents.notes, *clock.notes, *_of_the_start(clock), *told]
+    notes += _of_units(scales, record.units, said=not contents.about)
     notes += _held(source, {choice.name: samples_of(contents, source, choice) for choice in every})
-    if not named and contents.points and not contents.about:
-        numbered = (f"{dof} is {point_name(*point)}" for point, dof in dofs_of_points(contents).items())
-        notes.append(f"Degrees of freedom by node and direction: {', '.join(numbered)}.")
-    return record.dated(None if begins is None else str(begins)).noted(*notes)
+    if contents.points and not contents.about and not any(asked.wanted):
+        notes.append(_of_the_points(contents))
+    begins = contents.about.get("begins") if clock.begins is None else str(clock.begins)
+    return record.dated(begins).noted(*notes)
+
+
+def _names(contents: Contents, source: str, asked: Asked) -> Mapping[str, ChannelName]:
+    """Names of channels by kind: those that are asked for, else those that the file says the kind of."""
+    named = {kind: names for kind, names in zip(KINDS, asked.wanted, strict=True) if names is not None}
+    return named or own_names(contents, source)
+
+
+def _of_the_whole(contents: Contents, asked: Asked, default_name: str | None) -> dict[str, Any]:
+    """What is to be known of the record as a whole: as the caller says, else as the file does."""
+    about = contents.about
+    return {
+        "at_rest": about.get("at_rest", False) if asked.at_rest is None else asked.at_rest,
+        "drive": asked.drive or about.get("drive", "force"),
+        "name": about.get("name", default_name) if asked.name is None else asked.name,
+    }
+
+
+def _of_the_start(clock: Clock) -> Iterator[str]:
+    if clock.begins is not None:
+        yield f"The clock reads zero at {str(clock.begins).replace('T', ' ')}."
+
+
+def _of_the_points(contents: Contents) -> str:
+    numbered = (f"{dof} is {point_name(*point)}" for point, dof in dofs_of_points(contents).items())
+    return f"Degrees of freedom by node and direction: {', '.join(numbered)}."
 
 
 class _Scale(NamedTuple):
