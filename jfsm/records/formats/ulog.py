@@ -3,6 +3,7 @@
 import contextlib
 import io
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -11,6 +12,7 @@ import numpy as np
 from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, optional_package
 
 MICROSECOND = 1e-6
+_HEADER, _KINDS = 16, b"BFIMPQARDLCSO"  # bytes ahead of the messages, and their kinds
 CLOCKS = ("timestamp_sample", "timestamp")  # when the sensor read, when the message was sent
 # Fields of PX4's messages and their units, by its definitions.
 _UNITS = (
@@ -62,7 +64,7 @@ class UlogFormat(AbstractFormat):
             Lazy(fields, samples),
             units,
             clocks=Lazy(fields, clock),
-            notes=tuple(_notes(log, topics, orders)),
+            notes=(*_notes(log, topics, orders), *_of_damage(path)),
         )
 
 
@@ -100,6 +102,21 @@ def _notes(log: Any, topics: dict[str, dict[str, np.ndarray]], orders: dict[str,
     if lost:
         notes.append(f"The logger dropped messages {len(log.dropouts)} times, for {lost} ms in all; the gaps are kept.")
     return notes
+
+
+def _of_damage(path: Path) -> Iterator[str]:
+    """What is amiss in the chain of messages: the reader passes over it."""
+    data, place = path.read_bytes(), _HEADER
+    while place < len(data):
+        head = data[place : place + 3]
+        size = int.from_bytes(head[:2], "little")
+        if len(head) < 3 or place + 3 + size > len(data):
+            yield f"The log ends within a message, {len(data) - place} bytes before its end: it was cut short."
+            return
+        if head[2] not in _KINDS:
+            yield f"The log is damaged from byte {place} on; what cannot be made out behind is missing."
+            return
+        place += 3 + size
 
 
 def _unit(topic: str, field: str) -> str:

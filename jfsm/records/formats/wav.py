@@ -50,7 +50,8 @@ class WavFormat(AbstractFormat):
         names = [f"channel {place}" for place in range(1, len(columns[0]) + 1)]
 
         def channel(name: str) -> np.ndarray:
-            column = np.asarray(columns[:, names.index(name)], dtype=np.float64)
+            with np.errstate(invalid="ignore"):  # what is no number becomes one that is refused
+                column = np.asarray(columns[:, names.index(name)], dtype=np.float64)
             if kind == "u1":
                 column -= 128.0  # eight bits have no sign
             return column / FULL_SCALE.get(kind, 1.0)
