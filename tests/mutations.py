@@ -59,9 +59,10 @@ def _wav(path: Path) -> dict[str, Any]:
 
 
 def _npy(path: Path) -> dict[str, Any]:
-    columns = np.rec.fromarrays([T, F, X], names="time,F,x")
+    columns = np.zeros(N, dtype=[("time", float), ("F", float), ("x", float)])
+    columns["time"], columns["F"], columns["x"] = T, F, X
     with path.open("wb") as stream:
-        np.save(stream, np.asarray(columns))
+        np.save(stream, columns)
     return ASKED
 
 
@@ -190,17 +191,52 @@ def _ulog(path: Path) -> dict[str, Any]:
     return {"force": "rig.F", "displacement": "rig.x"}
 
 
+def _bag(path: Path) -> dict[str, Any]:
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    path.unlink(missing_ok=True)
+    with Writer(path) as writer:
+        _send(store, writer, store.serialize_ros1)
+    return {"force": "/rig.x", "displacement": "/rig.y", "units": {"/rig.x": "N", "/rig.y": "m"}}
+
+
+def _mcap(path: Path) -> dict[str, Any]:
+    import shutil
+
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store, folder = get_typestore(Stores.ROS2_HUMBLE), path.with_suffix("")
+    shutil.rmtree(folder, ignore_errors=True)
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        _send(store, writer, store.serialize_cdr)
+    next(folder.glob("*.mcap")).rename(path)
+    return {"force": "/rig.x", "displacement": "/rig.y", "units": {"/rig.x": "N", "/rig.y": "m"}}
+
+
+def _send(store: Any, writer: Any, serialized: Callable[[Any, str], Any]) -> None:
+    kind = "geometry_msgs/msg/Vector3"
+    rig = writer.add_connection("/rig", kind, typestore=store)
+    for i, (f, x) in enumerate(zip(F, X, strict=True)):
+        writer.write(rig, 10**18 + 5_000_000 * i, serialized(store.types[kind](float(f), float(x), 0.0), kind))
+
+
 WRITERS: dict[str, Writer] = {
-    name[1:]: writer
-    for name, writer in list(globals().items())
-    if name.startswith("_") and not name.startswith("__") and callable(writer)
-}
+    writer.__name__[1:]: writer
+    for writer in (
+        _csv, _german, _lvm, _json, _at2, _sto, _wav, _npy, _npz, _mat, _h5, _uff, _tdms, _xlsx, _parquet, _feather,
+        _c3d, _ulog, _bag, _mcap,
+    )
+}  # fmt: skip
 TEXT = ("csv", "german", "lvm", "json", "at2", "sto")
 
 
 def edits(name: str, original: bytes, rng: np.random.Generator) -> tuple[str, bytes]:
     """A kind of edit, and the edited file."""
     kinds = ["cut", "flip", "flips", "drop", "zeros", "twice"] + (["line", "word", "digit"] if name in TEXT else [])
+    kinds = ["cut", "drop"] if name == "h5" else kinds  # on a wrong tag libhdf5 may run for ever
     kind, size = str(rng.choice(kinds)), len(original)
     at = int(rng.integers(0, size))
     if kind == "cut":
@@ -266,14 +302,17 @@ def tried(count: int, names: tuple[str, ...], seed: int = 0) -> Iterator[tuple[s
     """Kind of file, kind of edit, outcome and words, of so many edits."""
     with tempfile.TemporaryDirectory() as folder:
         for name in names:
-            path = Path(folder) / f"run_{name}"
+            path = Path(folder) / f"run_{name}{f'.{name}' if name in ('bag', 'mcap') else ''}"
             asked = WRITERS[name](path)
             original, usual = path.read_bytes(), jfsm.read(path, **asked).notes
             rng = np.random.default_rng([seed, *name.encode()])
             for _ in range(max(1, count // len(names))):
                 kind, edited = edits(name, original, rng)
                 path.write_bytes(edited)
-                yield name, kind, *outcome(path, asked, usual)
+                what, words = outcome(path, asked, usual)
+                if what == "silent" and kind == "cut" and " 0 differ" in words and name in (*TEXT, "ulog"):
+                    what = "as stated"  # between two rows or messages: nothing shows that there were more
+                yield name, kind, what, words
 
 
 if __name__ == "__main__":

@@ -117,6 +117,65 @@ def test_motion_capture_that_is_cut_short_is_refused(tmp_path, kept, words):
         read(path, displacement="toe.Z")
 
 
+def _record_of_c3d(name, number, body=b"", order="<"):
+    """A group (number below 0) or a parameter."""
+    step = struct.pack(f"{order}h", 2 + len(body))
+    return struct.pack("bb", len(name), number) + name + step + body
+
+
+def _texts(*words):
+    length = max(map(len, words))
+    return struct.pack("bBBB", -1, 2, length, len(words)) + b"".join(word.ljust(length) for word in words) + b"\0"
+
+
+def _integers(order, kind=84):
+    """Ten frames of one marker in steps of 0.5 mm and of two channels, two samples a frame, as integers."""
+
+    def numbers(letter, kind, *values):
+        return struct.pack(f"{order}bBB{len(values)}{letter}", kind, 1, len(values), *values) + b"\0"
+
+    parameters = bytes((1, 80, 2, kind))
+    for record in (
+        (b"POINT", -1, b"\0"), (b"LABELS", 1, _texts(b"toe")), (b"UNITS", 1, _texts(b"mm")),
+        (b"RATE", 1, numbers("f", 4, 50.0)),
+        (b"ANALOG", -2, b"\0"), (b"LABELS", 2, _texts(b"Fz", b"EMG")), (b"UNITS", 2, _texts(b"N", b"V")),
+        (b"SCALE", 2, numbers("f", 4, 0.25, 3.0)), (b"GEN_SCALE", 2, numbers("f", 4, 0.1)),
+        (b"OFFSET", 2, numbers("h", 2, 2048, -7)),
+    ):  # fmt: skip
+        parameters += _record_of_c3d(*record, order=order)
+    header = bytes((2, 80)) + struct.pack(f"{order}5Hf2Hf", 1, 4, 1, 10, 0, 0.5, 4, 2, 50.0)
+    frames = b"".join(
+        struct.pack(f"{order}8h", 2 * i, 4 * i, -i, -1 if i == 7 else 0, 2048 + i, -7, 2049 + i, -6) for i in range(10)
+    )
+    return header.ljust(512, b"\0") + (parameters + bytes(2)).ljust(1024, b"\0") + frames
+
+
+@pytest.mark.parametrize(("order", "kind"), [("<", 84), (">", 86)])
+def test_motion_capture_in_integers_is_scaled_as_it_states(tmp_path, order, kind):
+    (tmp_path / "a.c3d").write_bytes(_integers(order, kind))
+    force = read(tmp_path / "a.c3d", force="Fz")
+    np.testing.assert_allclose(force.time, 0.01 * np.arange(20))
+    counted = np.stack([np.arange(10), np.arange(10) + 1], 1).ravel()
+    np.testing.assert_allclose(force.channels["force", 1], 0.025 * counted)
+    with pytest.raises(ValueError, match="must be finite; 1 of 10"):
+        read(tmp_path / "a.c3d", displacement="toe.Y")
+    marker = read(tmp_path / "a.c3d", acceleration="EMG", sensitivity={"EMG": "0.3 V/g"})
+    np.testing.assert_allclose(marker.channels["acceleration", 1], 9.80665 * np.tile([0.0, 1.0], 10))
+    (tmp_path / "a.c3d").write_bytes(_integers("<", 85))
+    with pytest.raises(ValueError, match="written on a DEC"):
+        read(tmp_path / "a.c3d", force="Fz")
+
+
+def test_more_frames_than_the_header_can_say_are_read(tmp_path):
+    header = bytes((2, 80)) + struct.pack("<5Hf2Hf", 1, 0, 1, 0xFFFF, 0, -1.0, 4, 0, 100.0)
+    frames = np.zeros((70_000, 4), "<f4")
+    frames[:, 0] = np.arange(70_000)
+    whole = header.ljust(512, b"\0") + bytes((1, 80, 2, 84)).ljust(1024, b"\0") + frames.tobytes()
+    (tmp_path / "a.c3d").write_bytes(whole)
+    record = read(tmp_path / "a.c3d", displacement="point 1.X")
+    np.testing.assert_array_equal(record.channels["displacement", 1], np.arange(70_000))
+
+
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [

@@ -35,8 +35,8 @@ def read(
     ----------
     source : str, Path, DataFrame, Dataset or sequence of dict
         A file, told by what it holds, whatever its ending: text, LabVIEW, WAV, NumPy, JSON, MATLAB, HDF5, UFF,
-        strong-motion and OpenSim text; with extras (``jfsm[excel]``, ``[tdms]``, ``[mf4]``, ``[parquet]``, ``[ros]``,
-        ``[px4]``, ``[c3d]``) spreadsheets, TDMS, MDF, Parquet, ROS bags, logs of PX4 and motion capture. docs/files.md
+        strong-motion and OpenSim text, motion capture; with extras (``jfsm[excel]``, ``[tdms]``, ``[mf4]``,
+        ``[parquet]``, ``[ros]``, ``[px4]``) spreadsheets, TDMS, MDF, Parquet, ROS bags and logs of PX4. docs/files.md
         says what is read of each. In memory: a DataFrame or Series of pandas, a DataFrame of polars, a Table of
         pyarrow, a Dataset or DataArray of xarray, channels after SEP 5. An index, or a coordinate, that holds instants
         is the clock.

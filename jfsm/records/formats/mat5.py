@@ -15,6 +15,7 @@ _NESTING = (1, 2, 3, 16, 17)  # classes whose elements may be matrices: cells, s
 _CHUNK = 1 << 20
 
 Order = Literal["little", "big"]
+_ORDERS: dict[bytes, Order] = {b"IM": "little", b"MI": "big"}
 
 
 def require_sound(path: Path) -> None:
@@ -27,7 +28,7 @@ def require_sound(path: Path) -> None:
     """
     with path.open("rb") as stream:
         head = stream.read(_HEADER)
-        order: Order | None = {b"IM": "little", b"MI": "big"}.get(head[126:128])  # pyright: ignore[reportAssignmentType]
+        order = _ORDERS.get(head[126:128])
         if order is None or int.from_bytes(head[124:126], order) != 0x0100:
             return
         _Checked(stream, order).file(os.fstat(stream.fileno()).st_size)
@@ -35,7 +36,8 @@ def require_sound(path: Path) -> None:
 
 class _Checked:
     def __init__(self, stream: BinaryIO, order: Order):
-        self._stream, self._order = stream, order
+        self._stream = stream
+        self._order: Order = order
 
     def file(self, size: int) -> None:
         place = _HEADER

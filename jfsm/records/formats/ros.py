@@ -1,6 +1,7 @@
 """ROS 1 and ROS 2 recordings (.bag, .mcap, .db3), through rosbags (an optional extra)."""
 
 import math
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, ClassVar
@@ -56,9 +57,11 @@ class _Recording:
         self._highlevel, self._path = highlevel, path
         self.first: dict[str, Any] = {}
         self.sensor: set[str] = set()
-        zero: float = math.inf
+        self._announced: dict[str, int] = {}
+        counted, zero = Counter[str](), math.inf
         for topic, recorded, message in self._messages(None):
             zero = min(recorded, zero)
+            counted[topic] += 1
             if topic in self.first:
                 continue
             self.first[topic] = message
@@ -71,6 +74,11 @@ class _Recording:
         if not self.names:
             raise ValueError(f"{path.name} must hold messages with numbers; it holds none. Record the topics again.")
         self.zero = int(zero)
+        self._missing = {
+            topic: announced - counted[topic]
+            for topic, announced in self._announced.items()
+            if announced != counted[topic]
+        }
         self._read: dict[str, tuple[np.ndarray, list[Any]]] = {}
 
     def contents(self) -> Contents:
@@ -106,6 +114,8 @@ class _Recording:
         return next((UNITS[part] for part in reversed(field.split(".")) if part in UNITS), None)
 
     def _notes(self) -> Iterator[str]:
+        for topic, missing in self._missing.items():
+            yield f"{topic} announces {missing} more messages than can be read: the recording is damaged."
         if self.sensor:
             yield f"Clocks are those of the sensors (header.stamp) on {', '.join(sorted(self.sensor)[:4])}."
         if others := set(self.first) - self.sensor:
@@ -116,6 +126,9 @@ class _Recording:
         try:
             with self._highlevel.AnyReader([self._path]) as reader:
                 wanted = [each for each in reader.connections if topic is None or each.topic == topic]
+                self._announced = dict.fromkeys((each.topic for each in wanted), 0)
+                for each in wanted:
+                    self._announced[each.topic] += each.msgcount
                 for connection, stamp, raw in reader.messages(connections=wanted):
                     yield connection.topic, stamp, reader.deserialize(raw, connection.msgtype)
         except Exception as error:  # whatever the reader stumbles over in bytes that are no such file
