@@ -206,31 +206,31 @@ def _of_dataset(dataset: Any) -> Contents:
     shared = len(set(along.values())) == 1
     arrays: dict[str, Any] = {}
     aliases: dict[str, tuple[str, ...]] = {}
-    units: dict[str, str] = {}
     for name, variable in held.items():
         dimension = along[name]
-        around = "" if shared or dimension is None else f"{dimension}/"
-        if dimension is not None:
-            variable = variable.transpose(dimension, ...)
-            if dimension in variable.coords:
-                arrays[around + CLOCK] = variable.coords[dimension]
-        arrays[around + name] = variable
+        around = "" if shared or not dimension else f"{dimension}/"
+        arrays |= _with_clock(variable, name, dimension, around)
         if around:
             aliases[name] = (around + name,)
-    for name, variable in arrays.items():
-        if variable.attrs.get("units"):
-            units[name] = str(variable.attrs["units"])
     skipped = [str(name) for name in dataset.data_vars if str(name) not in held]
     return Contents(
         Lazy(arrays, lambda name: np.asarray(arrays[name].values)),
-        units,
+        {name: str(each.attrs["units"]) for name, each in arrays.items() if each.attrs.get("units")},
         notes=(f"Not numbers, and left out: {', '.join(skipped[:6])}.",) if skipped else (),
         aliases=aliases,
     )
 
 
-def _dimension_of_time(variable: Any) -> str | None:
-    """The dimension along which the samples lie: that of instants, that called time, else the longest."""
+def _with_clock(variable: Any, name: str, dimension: str, around: str) -> dict[str, Any]:
+    """A variable with its samples first, behind the coordinate of its dimension, if it has one."""
+    if not dimension:
+        return {around + name: variable}
+    clock = {around + CLOCK: variable.coords[dimension]} if dimension in variable.coords else {}
+    return {**clock, around + name: variable.transpose(dimension, ...)}
+
+
+def _dimension_of_time(variable: Any) -> str:
+    """The dimension along which the samples lie: that of instants, or called time, else the longest; else empty."""
     dimensions = [str(dimension) for dimension in variable.dims]
     ranked = sorted(
         dimensions,
@@ -240,7 +240,7 @@ def _dimension_of_time(variable: Any) -> str | None:
             -variable.sizes[d],
         ),
     )
-    return ranked[0] if ranked else None
+    return ranked[0] if ranked else ""
 
 
 def _of_data_array(array: Any) -> Contents:

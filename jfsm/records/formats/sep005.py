@@ -24,7 +24,25 @@ def contents_of_channels(channels: Mapping[str, Any] | Iterable[Mapping[str, Any
     ValueError
         If a channel lacks a key or two have one name.
     """
-    given: list[Any] = [channels] if isinstance(channels, Mapping) else list(channels)
+    given = _checked([channels] if isinstance(channels, Mapping) else list(channels))
+    begins = min(filter(None, map(_start, given.values())), default=None)
+    begun = sorted({str(channel["start_timestamp"]) for channel in given.values() if channel.get("start_timestamp")})
+    return Contents(
+        {name: np.asarray(channel["data"]) for name, channel in given.items()},
+        {name: str(channel["unit_str"]) for name, channel in given.items() if channel["unit_str"]},
+        clocks={name: _clock(channel) + _late(channel, begins) for name, channel in given.items()},
+        kinds={
+            name: QUANTITIES[channel["quantity"]]
+            for name, channel in given.items()
+            if channel.get("quantity") in QUANTITIES
+        },
+        notes=(f"Measured from {', '.join(begun)}.",) if begun and begins is None else (),
+        begins=begins,
+    )
+
+
+def _checked(given: list[Any]) -> dict[str, Mapping[str, Any]]:
+    """The channels by name, each with what it needs and a name of its own."""
     for place, channel in enumerate(given):
         if not isinstance(channel, Mapping):
             raise TypeError(
@@ -42,20 +60,7 @@ def contents_of_channels(channels: Mapping[str, Any] | Iterable[Mapping[str, Any
     twins = sorted({name for name in names if names.count(name) > 1})
     if twins:
         raise ValueError(f"`channels` must have names of their own; {twins} occur more than once. Rename them.")
-    begins = min(filter(None, map(_start, given)), default=None)
-    begun = sorted({str(channel["start_timestamp"]) for channel in given if channel.get("start_timestamp")})
-    return Contents(
-        {name: np.asarray(channel["data"]) for name, channel in zip(names, given, strict=True)},
-        {name: str(channel["unit_str"]) for name, channel in zip(names, given, strict=True) if channel["unit_str"]},
-        clocks={name: _clock(channel) + _late(channel, begins) for name, channel in zip(names, given, strict=True)},
-        kinds={
-            name: QUANTITIES[channel["quantity"]]
-            for name, channel in zip(names, given, strict=True)
-            if channel.get("quantity") in QUANTITIES
-        },
-        notes=(f"Measured from {', '.join(begun)}.",) if begun and begins is None else (),
-        begins=begins,
-    )
+    return dict(zip(names, given, strict=True))
 
 
 def channels_of(contents: Contents) -> list[dict[str, Any]]:
