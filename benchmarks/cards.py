@@ -26,14 +26,14 @@ LIKELIEST = 3
 def asking_widely() -> Iterator[None]:
     """Diagnoses in here measure of the likeliest hypotheses all that another verdict might ask."""
     from jfsm.diagnosis import _diagnose
-    from jfsm.diagnosis.verdict.judge import judge
+    from jfsm.diagnosis.verdict.judge import judge_in_sign
 
     def judged(evidence: Any) -> Any:
-        decision = judge(evidence)
+        decision = judge_in_sign(evidence)
         ask(evidence)
         return decision
 
-    with mock.patch.object(_diagnose, "judge", judged):
+    with mock.patch.object(_diagnose, "judge_in_sign", judged):
         yield
 
 

@@ -2,8 +2,9 @@
 
 import enum
 import operator
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 
 class Result(enum.Enum):
@@ -52,3 +53,8 @@ class Check(NamedTuple):
     unit: str
     passed: bool
     says: str
+
+    @classmethod
+    def of_plain(cls, written: Mapping[str, Any]) -> "Check":
+        """What was written to JSON, infinite numbers as words."""
+        return cls(**{**written, "measured": float(written["measured"]), "threshold": float(written["threshold"])})

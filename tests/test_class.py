@@ -113,3 +113,12 @@ def test_where_the_law_is_open_its_class_comes_first(probability: float, kind_pr
         members={"cubic_hardening": probability, rivals[0].cause: rivals[0].probability},
     )
     assert finding_sentence(shown, jfsm.causes()).startswith(f"The model lacks {words}")
+
+
+def test_where_no_law_of_a_class_has_the_shape_that_is_said():
+    found = Finding(
+        "cubic_hardening", "stiffness", (0, 1), 0.58, {}, (), "grows", "a hardening spring", 0.99, law_open=True,
+        members={"cubic_hardening": 0.58},
+    )  # fmt: skip
+    words = finding_sentence(found, jfsm.causes())
+    assert words.endswith("its law is open: a cubic hardening spring (58%), or one of another shape (41%).")

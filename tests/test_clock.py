@@ -11,12 +11,15 @@ from scipy.integrate import solve_ivp
 from test_verdict import evidence_of, given, refit
 
 import jfsm
+from jfsm._limit import UNLIMITED
 from jfsm.diagnosis import Evidence, judge
 from jfsm.diagnosis.channels.clock import WAYS, in_its_time, lateness
 from jfsm.diagnosis.evidence.as_recorded import change_by_times
 from jfsm.diagnosis.evidence.setup import Problem
 from jfsm.diagnosis.search.baseline import fit_model
-from jfsm.identification import prepare_all
+from jfsm.diagnosis.search.steps import Steps
+from jfsm.diagnosis.search.study import Study
+from jfsm.identification import Posterior, prepare_all
 
 N, STEP, NOISE = 1200, 0.04, 0.002
 MASS, DAMPING, STIFFNESS = np.array([2.0, 1.0]), np.array([0.5, 0.3]), np.array([60.0, 45.0])
@@ -40,6 +43,7 @@ def recorded(
     masses: int = 1,
     kinds: tuple[str, ...] = ("displacement",),
     cubic: float = 0.0,
+    quadratic: float = 0.0,
     told: Callable[[Any], Any] = force_at,
 ) -> jfsm.Record:
     """A noisy record of a chain at rest under a force on its last mass that acts so, recorded as it is `told`."""
@@ -48,7 +52,9 @@ def recorded(
     def rates(t: float, y: np.ndarray) -> np.ndarray:
         x, v = y[:masses], y[masses:]
         d = np.diff(x, prepend=0.0)
-        link = k * d + c * np.diff(v, prepend=0.0) + cubic * d**3
+        w = np.diff(v, prepend=0.0)
+        link = k * d + c * w + cubic * d**3
+        link[-1] += quadratic * w[-1] * abs(w[-1])
         net = np.append(link[1:], acting(t)) - link
         return np.concatenate([v, net / m])
 
@@ -117,6 +123,22 @@ def test_a_force_in_time_stays_as_it_was_recorded():
     assert change_by_times(given.structure, problem.first, "band-limited") == 0.0
 
 
+def test_a_late_force_beside_a_law_has_to_be_likelier_than_all_that_is_known():
+    problem = problem_of(recorded(held), chain())
+    _, refitted = fit_model(problem)
+    found = in_its_time(refitted, problem, to_noise=True, likeliest=refitted.evidence + 100.0)
+    assert found is not None and found.first.reconstruction == "hold"
+    assert in_its_time(refitted, problem, to_noise=True, likeliest=refitted.evidence + 1e6) is None
+
+
+def test_a_way_of_the_force_in_which_a_law_runs_away_promises_nothing(monkeypatch):
+    problem = problem_of(recorded(held), chain())
+    _, refitted = fit_model(problem)
+    nowhere = np.full((1, 9), np.nan)
+    monkeypatch.setattr(Posterior, "evaluate", lambda *_: (nowhere[0], nowhere, np.full((1, 9, 9), np.nan)))
+    assert in_its_time(refitted, problem, to_noise=True) is None
+
+
 def test_a_single_line_shows_no_late_force():
     record = recorded(lambda t: float(single_line(t - 0.5 * STEP)), told=single_line)
     problem = problem_of(record, chain())
@@ -172,6 +194,19 @@ def test_a_force_that_is_hardly_late_is_said_and_no_cause():
     assert any("later than it was recorded" in note for note in d.notes)
 
 
+def test_a_delay_that_was_no_candidate_is_tried_where_the_force_turns_out_to_be_in_time():
+    record, model = recorded(late(0.0)), chain()
+    chosen = {name: jfsm.structures.causes()[name] for name in TRIED}
+    study = Study(model, chosen, None, None, jax.random.key(0), Steps(None, 4), UNLIMITED, False)
+    problem, channel = problem_of(record, model), ("force", 1)
+    timed = problem.timed("band-limited", {channel: 0.01})
+    tried = [[(c.effects[0].cause.id, c.effects[0].at) for c in study._candidates(p)] for p in (problem, timed)]
+    assert ("force_delay", channel) in tried[0] and ("force_delay", channel) not in tried[1]
+    (untried,) = study._delays(problem, timed)
+    assert (untried.effects[0].cause.id, untried.effects[0].at) == ("force_delay", channel)
+    assert study._delays(problem, problem) == study._delays(timed, timed) == []
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("acting", [late(0.3), held], ids=["late", "held"])
 def test_a_law_is_named_beside_a_late_force(acting: Callable[[float], float]):
@@ -180,6 +215,15 @@ def test_a_law_is_named_beside_a_late_force(acting: Callable[[float], float]):
     k3 = d.findings[0].parameters["k3"]
     assert k3.low < 40.0 < k3.high
     assert d.gain is not None and d.gain.after < 1.5 * d.gain.floor
+
+
+@pytest.mark.slow
+def test_what_makes_up_for_a_force_that_is_held_is_not_named_instead_of_a_law():
+    record = recorded(held, masses=2, quadratic=4.0)
+    causes = (*TRIED, "lugre", "stribeck")
+    d = jfsm.diagnose(record, chain(2), causes=causes, max_causes=1, key=jax.random.key(0))
+    assert [(f.cause, f.at) for f in d.findings] == [("quadratic_damping", (1, 2)), ("force_delay", ("force", 2))]
+    assert d.findings[0].parameters["c2"].value == pytest.approx(4.0, rel=0.05)
 
 
 @pytest.mark.slow

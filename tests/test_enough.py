@@ -37,6 +37,12 @@ def trial(evidence: float, power: float, *causes: str) -> Any:
 GIVEN, REFITTED = trial(0.0, 0.5), trial(1000.0, 0.1)
 
 
+def test_correlated_innovations_alone_are_no_reason_to_look_for_a_second_effect():
+    refitted, best = trial(0.0, 0.1), trial(9000.0, 2e-4, "coulomb")
+    assert best.whiteness > 0.1
+    assert not something_left([refitted, best], refitted, lambda t: OtherShapes(6.0), imposed=False)
+
+
 @pytest.mark.parametrize(("left", "worth"), [(1.5e-3, False), (2.5e-3, True)])
 def test_a_second_effect_is_looked_for_where_more_is_left_than_chance_leaves(left: float, worth: bool):
     refitted, best = trial(0.0, 1.0), trial(9000.0, left, "coulomb")
@@ -89,7 +95,18 @@ def test_the_search_is_settled_by_a_law_that_leaves_noise_only_and_is_what_it_is
     best = trial(9000.0, left, "coulomb")
     best.laws = (SimpleNamespace(at=(0, 1), otherwise=lambda stiffness: otherwise),)
     best.structure = SimpleNamespace(stiffness_of=lambda at: 1.0)
-    assert settled([GIVEN, REFITTED, best]) == enough
+    assert settled([GIVEN, REFITTED, best], lambda t: OtherShapes(0.0)) == enough
+
+
+@pytest.mark.parametrize(
+    ("left", "nats", "enough"),
+    [(3e-4, 6.0, True), (3e-4, 16.0, False), (3e-4, 0.0, False), (3e-3, 6.0, False)],
+    ids=["of the right shape", "of another shape", "nobody knows", "much is left"],
+)
+def test_innovations_that_no_force_explains_settle_the_search(left, nats, enough):
+    best = trial(9000.0, left, "coulomb")
+    assert best.whiteness > 0.1
+    assert settled([GIVEN, REFITTED, best], lambda t: OtherShapes(nats)) == enough
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """What a record shows beside the model as given, before anything is fitted."""
 
+import json
 from functools import cache
 
 import jax
@@ -8,6 +9,7 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 import jfsm
+from jfsm.diagnosis import Evidence, judge
 from jfsm.diagnosis.look.looked import looked_at
 from tests.blind import draw, draw_chain
 from tests.blind.chain import Chain
@@ -192,6 +194,7 @@ def test_a_diagnosis_names_the_wrong_sign_and_goes_on_with_the_right_one(tmp_pat
     assert any("1 sample is torn" in note and "-9999 N" in note for note in d.notes)
     failed = {row.name for row in d.decision.checks if row.stage == "sensors" and not row.passed}
     assert failed == {"takes_energy", "no_torn_samples"}
+    assert judge(Evidence.of_plain(json.loads(json.dumps(d.data["evidence"])))) == d.decision
     readings = jfsm.simulate(d.extended, record).readings(record)["force", 1]
     left = (readings - np.asarray(record.force)[:, 0])[np.arange(900) != 333]
     assert np.std(left) < 0.1  # the extended model shows what the sensor did, sign and all

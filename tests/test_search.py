@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 import jfsm
 from jfsm._limit import UNLIMITED
+from jfsm.diagnosis.evidence.prediction import Prediction
 from jfsm.diagnosis.evidence.score_test import Replaced, gains
 from jfsm.diagnosis.evidence.setup import Problem
 from jfsm.diagnosis.hypotheses.candidate import Candidate
@@ -440,3 +441,29 @@ def test_where_no_law_was_looked_for_none_is_fitted_again():
     problem: Any = SimpleNamespace(model=None, records=[])
     found = search_again([], none, problem, lambda *_: None)
     assert found.trials == [] and found.behind == []
+
+
+@pytest.mark.parametrize(
+    ("left", "named"), [((0.2, 0.2), "blind"), ((0.2, 0.01), "sees")], ids=["both predict", "one predicts nothing"]
+)
+def test_of_two_fits_of_a_law_the_more_probable_one_stands_unless_it_predicts_nothing(left, named):
+    class Fit(NamedTuple):
+        name: str
+        evidence: float
+        prediction: Any
+
+    def fit(name: str, evidence: float, power: float) -> Any:
+        error = np.full(2, power)
+        return Fit(name, evidence, Prediction(error, error, error))
+
+    assert batches._better(fit("blind", 900.0, left[0]), fit("sees", 100.0, left[1])).name == named
+    assert batches._better(fit("sees", 100.0, left[1]), fit("blind", 900.0, left[0])).name == named
+
+
+@pytest.mark.parametrize("imposed", [True, False])
+def test_along_an_imposed_motion_a_law_that_predicts_goes_on_behind_those_that_are_far_more_probable(imposed: bool):
+    def batch(best: float, left: float) -> Any:
+        return SimpleNamespace(best=best, left=left, imposed=imposed, behind=0.0)
+
+    blind, sees = [batch(-1e4 - k, 0.4) for k in range(3)], batch(0.0, 0.01)
+    assert (sees in batches._near([*blind, sees], 2)) == imposed

@@ -33,7 +33,7 @@ from .report.unfinished import Unfinished
 from .search.rounds import Searched
 from .search.steps import Progress, Steps
 from .search.study import Study
-from .verdict.judge import judge
+from .verdict.judge import judge_in_sign
 
 _ROUNDS = 3
 """Times that a record is looked into, at most, in which channels turn out to be late by less than a sample."""
@@ -159,8 +159,10 @@ def _diagnosed(
     problem, every, found, held, late = _looked_into(record, holdout, study)
     steps.next("the verdict, and its gain on held-out readings")
     assumed = study.ways[0]
-    weighed = Weighed(found, problem, clipped, HeldOutRuns(stated, model, held, key, assumed))
-    decision = judge(weighed.evidence)
+    weighed = Weighed(
+        found, problem, clipped, HeldOutRuns(stated, model, held, key, assumed), looked.checks, looked.inverted
+    )
+    decision = judge_in_sign(weighed.evidence)
     behind = weighed.behind(decision)
     judged, tried, winner = behind.problem, behind.found, behind.trial(decision.winner)
     late_forces, (gain, runs) = behind.late(decision), behind.gain(decision)

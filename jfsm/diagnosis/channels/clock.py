@@ -42,18 +42,20 @@ class _Timed(NamedTuple):
     late: bool
 
 
-def in_its_time(beside: Trial, problem: Problem, *, to_noise: bool) -> Problem | None:
+def in_its_time(beside: Trial, problem: Problem, *, to_noise: bool, likeliest: float | None = None) -> Problem | None:
     """The problem in which the force acts otherwise, where that is far likelier beside a trial; None elsewhere.
 
     It has to explain nearly all of what the trial leaves, or leave noise alone, as it must with `to_noise`: what a
     model lacks may look like a late force, and so may one late response of two. A single line does not show it.
+    The `likeliest` evidence known is what it has to exceed, that of the trial by default.
     """
-    ways = _worth_a_fit(beside, problem)
+    behind = 0.0 if likeliest is None else likeliest - beside.evidence
+    ways = _worth_a_fit(beside, problem, behind)
     found = [] if problem.limit.over else [one for way in ways for one in _fitted(beside, problem, way)]
     if not found:
         return None
     best = _likeliest(found)
-    least = max(THRESHOLDS.searched, _by_a_late_channel(beside, problem))
+    least = max(behind + THRESHOLDS.searched, _by_a_late_channel(beside, problem))
     likelier = best.trial.evidence - beside.evidence >= least
     enough = is_noise_only(best.trial) or (not to_noise and explained(best.trial, beside) >= THRESHOLDS.nearly_all)
     return best.problem if likelier and enough else None
@@ -84,12 +86,12 @@ def lateness(t: Trial, problem: Problem, assumed: Reconstruction = WAYS[0]) -> L
     return found
 
 
-def _worth_a_fit(beside: Trial, problem: Problem) -> list[_Way]:
-    """The ways that promise most beside a trial, where they promise enough."""
+def _worth_a_fit(beside: Trial, problem: Problem, behind: float) -> list[_Way]:
+    """The ways that promise most beside a trial, where they promise enough for one that is so far behind."""
     if not problem.ways or not _forces(beside.structure, problem.first) or single_line(problem.records) is not None:
         return []
     ways = [way for name in problem.ways for way in _promises(beside, problem, name)]
-    least = max(THRESHOLDS.searched, _WORTH_A_FIT * max(way.promise for way in ways))
+    least = max(behind + THRESHOLDS.searched, _WORTH_A_FIT * max((way.promise for way in ways), default=0.0))
     return [way for way in ways if way.promise >= least]
 
 
@@ -126,6 +128,8 @@ def _promises(beside: Trial, problem: Problem, way: Reconstruction) -> Iterator[
     one Newton step, the noise staying as strong as it was."""
     other, free = problem.timed(way, {}), _with_delays(beside, problem)
     value, gradient, information = (each[0] for each in other.posterior_of(free).evaluate(free.theta[None]))
+    if not (np.isfinite(value) and np.all(np.isfinite(gradient)) and np.all(np.isfinite(information))):
+        return  # it runs away there
     now = beside.value + _prior_of_delays(free.theta.size - beside.theta.size)
     follows = np.array([not u.path.startswith("noise@") for u in free.unknowns])
     for late in (False, True):

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..._result import Check
 from .held_out import HeldOutErrors
 from .plain import as_plain
 from .prediction import Prediction
@@ -42,7 +43,8 @@ class Setting(NamedTuple):
 
     `periods` of motion in the records; whether the motion is `imposed`; the share of the elastic force that is admitted
     as `model_error` to all; whether the search was `finished`; channels that are `clipped`, as (kind, number); forces
-    that are `late`, and the share of the signal by which that changes a run of the model as given.
+    that are `late`, and the share of the signal by which that changes a run of the model as given; channels that were
+    `turned`, since their signs are wrong.
     """
 
     periods: float
@@ -52,6 +54,7 @@ class Setting(NamedTuple):
     clipped: tuple[tuple[str, int], ...] = ()
     late: tuple[tuple[str, int], ...] = ()
     late_changes: float = 0.0
+    turned: tuple[tuple[str, int], ...] = ()
 
 
 class Measure(NamedTuple):
@@ -65,13 +68,15 @@ class Measure(NamedTuple):
 
 @dataclass
 class Evidence:
-    """Scorecards by key, and costly measurements, each made once, when it is first asked for."""
+    """Scorecards by key, and costly measurements, each made once, when it is first asked for; and the looks at the
+    records before any of them."""
 
     setting: Setting
     cards: Mapping[str, Scorecard]
     measure: Measure
     set_aside: tuple[SetAside, ...] = ()
     asked: dict[str, dict[str, Any]] = field(default_factory=dict)
+    looks: tuple[Check, ...] = ()
 
     @property
     def given(self) -> Scorecard:
@@ -116,6 +121,7 @@ class Evidence:
             "setting": as_plain(self.setting),
             "cards": [card.plain for card in self.cards.values()],
             "set_aside": as_plain(self.set_aside),
+            "looks": as_plain(self.looks),
             "asked": {
                 what: {
                     key: found.plain if isinstance(found, Evidence) else as_plain(found) for key, found in each.items()
@@ -127,8 +133,9 @@ class Evidence:
     @classmethod
     def of_plain(cls, written: Mapping[str, Any]) -> "Evidence":
         """What `plain` was made of; of what was not asked then it raises `NotMeasuredError`."""
-        channels = {name: tuple((k, n) for k, n in written["setting"].get(name, ())) for name in ("clipped", "late")}
-        setting = Setting(**{**written["setting"], **channels})
+        stated = written["setting"]
+        channels = {name: tuple((k, n) for k, n in stated.get(name, ())) for name in ("clipped", "late", "turned")}
+        setting = Setting(**{**stated, **channels})
         cards = [Scorecard.of_plain(card) for card in written["cards"]]
         made = {what: _MADE[what] for what in written["asked"]}
         asked = {
@@ -136,7 +143,8 @@ class Evidence:
             for what, each in written["asked"].items()
         }
         set_aside = tuple(SetAside(**each) for each in written["set_aside"])
-        return cls(setting, {card.key: card for card in cards}, _NOTHING_MORE, set_aside, asked)
+        looks = tuple(map(Check.of_plain, written["looks"]))
+        return cls(setting, {card.key: card for card in cards}, _NOTHING_MORE, set_aside, asked, looks)
 
 
 def map_on(key: str) -> str:

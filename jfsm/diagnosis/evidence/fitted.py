@@ -257,19 +257,26 @@ def whiteness(posterior: Posterior, theta: np.ndarray) -> float:
     return worst
 
 
+def lane_left(posterior: Posterior, theta: np.ndarray, lane: int) -> float:
+    """Error power that the prediction of one lane leaves, in those of the signal, over all sets."""
+    return float(np.sum(predict(_alone_in(posterior, lane), theta[lane]).error))
+
+
+def _alone_in(posterior: Posterior, lane: int) -> Posterior:
+    """The posterior of one lane by itself."""
+    if posterior.lanes == 1:
+        return posterior
+    hypothesis = posterior.hypothesis
+    alone = Hypothesis((hypothesis.structures[lane],), (hypothesis.unknowns[lane],))
+    return Posterior(alone, posterior.records, posterior.until)
+
+
 def trial(
     posterior: Posterior, maximum: Maximum, lane: int, rung: float, label: str = "", effects: tuple[Effect, ...] = ()
 ) -> Trial:
     """The lane of a fit as a trial."""
-    hypothesis = posterior.hypothesis
-    alone = (
-        posterior
-        if posterior.lanes == 1
-        else Posterior(
-            Hypothesis((hypothesis.structures[lane],), (hypothesis.unknowns[lane],)), posterior.records, posterior.until
-        )
-    )
-    theta, unknowns = maximum.theta[lane], hypothesis.unknowns[lane]
+    alone = _alone_in(posterior, lane)
+    theta, unknowns = maximum.theta[lane], posterior.hypothesis.unknowns[lane]
     scales = np.array([t for u, t in zip(unknowns, theta, strict=True) if u.path.startswith("noise@")])
     return Trial(
         label=label,

@@ -8,7 +8,8 @@ from functools import cached_property
 import jax
 import numpy as np
 
-from ...plant import Reconstruction
+from ..._result import Check
+from ...plant import Channel, Reconstruction
 from ...structures import Clipping, Structure
 from ..channels.clock import Lateness, late_channels, lateness
 from ..channels.delays import Late, showing_late
@@ -47,12 +48,15 @@ class HeldOutRuns:
 
 @dataclass
 class Weighed:
-    """What was found, as evidence, by the keys of the hypotheses."""
+    """What was found, as evidence, by the keys of the hypotheses; the looks at the records before, and the channels
+    whose signs they turned."""
 
     found: Searched
     problem: Problem
     clipped: Sequence[Clipping]
     held_out: HeldOutRuns
+    looks: Sequence[Check] = ()
+    turned: Sequence[Channel] = ()
     model_error: float = 0.0
     maps: dict[str, Trial] = field(default_factory=dict)
     runs: dict[str, tuple[Gain, list[dict]]] = field(default_factory=dict)
@@ -63,7 +67,13 @@ class Weighed:
         """Scorecards, and what is measured when it is asked for."""
         measure = Measure(self._other_shapes, self._with_map, self._held_out, self._with_model_error)
         cards = {card.key: card for card in self._cards()}
-        return Evidence(self._setting(), cards, measure, tuple(set_aside(self.found, cut=self.problem.limit.over)))
+        return Evidence(
+            self._setting(),
+            cards,
+            measure,
+            tuple(set_aside(self.found, cut=self.problem.limit.over)),
+            looks=tuple(self.looks),
+        )
 
     def behind(self, decision: Decision) -> "Weighed":
         """What a decision on this evidence rests on."""
@@ -115,6 +125,7 @@ class Weighed:
             clipped=tuple(sensor.at for sensor in self.clipped),
             late=tuple(late_channels(self.held_out.model, self.problem, self.held_out.assumed)),
             late_changes=change_by_times(self.held_out.stated, self.problem.first, self.held_out.assumed),
+            turned=tuple(self.turned),
         )
 
     def _cards(self) -> Iterator[Scorecard]:
@@ -173,7 +184,7 @@ class Weighed:
             return None
         problem, (given, refitted, *trials) = again
         found = self.found.judged_in(problem, given, refitted, trials)
-        self.other = Weighed(found, problem, self.clipped, self.held_out, problem.first.forgiven)
+        self.other = Weighed(found, problem, self.clipped, self.held_out, model_error=problem.first.forgiven)
         return self.other.evidence
 
 

@@ -57,6 +57,11 @@ class OtherShapes(NamedTuple):
     share: float = 0.0
     strays: float = 0.0
 
+    @property
+    def told(self) -> bool:
+        """Whether the records tell; coarse digits and imposed motions do not."""
+        return self.nats != 0.0
+
 
 @dataclass(frozen=True)
 class Scorecard:

@@ -1,20 +1,10 @@
-"""What was looked at before, in a verdict: its checks, channels of the wrong sign as causes, and words."""
-
-from dataclasses import replace
+"""What was looked at before, beside a verdict: channels of the wrong sign as causes, and words."""
 
 from ..._result import Estimate
 from ...reporting import capitalised
 from ...structures import Structure, causes
 from .._diagnosis import Finding
-from ..verdict.decision import Decision
 from .looked import MENDED, TURNED, Looked
-
-
-def with_looks(decision: Decision, looked: Looked) -> Decision:
-    """The decision with what was looked at before it; a channel of the wrong sign is a cause, whatever else is."""
-    verdict = "cause" if looked.inverted else decision.verdict
-    stopped = None if looked.inverted else decision.stopped_by
-    return replace(decision, verdict=verdict, stopped_by=stopped).after(looked.checks)
 
 
 def with_signs(findings: tuple[Finding, ...], verdict: str, looked: Looked) -> tuple[Finding, ...]:

@@ -21,11 +21,11 @@ from ..evidence.plain import as_plain
 from ..evidence.scorecard import GIVEN
 from ..evidence.setup import Problem
 from ..hypotheses.candidate import Candidate
-from ..look.in_verdict import in_words, with_looks, with_signs
+from ..look.in_verdict import in_words, with_signs
 from ..look.looked import Looked
 from ..search.batches import LeftBehind
 from ..verdict.decision import Decision
-from ..verdict.judge import evidence_behind
+from ..verdict.judge import after_looks, evidence_behind
 from .estimates import Units, modes_of_trial, noise_by_channel, plain_modes, refitted_values, smallest_effects, unit_of
 from .findings import Ranked, findings_of, fitted_candidate, unfitted_candidate
 from .force_shape import Shape, shape_of
@@ -101,7 +101,7 @@ def assemble(
     sentence = verdict_sentence(decision, reached.winner, findings, gain, shape, differ, imposed=imposed)
     sentence = beside_late_forces(sentence, verdict, late)
     sentence, advice = in_words(sentence, looked, verdict_advice(decision, gain, imposed=imposed))
-    decision = with_looks(decision, looked)
+    decision = after_looks(decision, reached.evidence)
     findings = with_signs(findings, verdict, looked)
     data = {
         "jfsm": jfsm_version(),

@@ -44,10 +44,11 @@ class Ranked(NamedTuple):
         return sum(chances.values())
 
     def shares(self, kind: str, at: tuple) -> dict[str, float]:
-        """Probability of every cause of a class at a place, the most probable first."""
+        """Probability of every cause of a class at a place, the most probable first; with that of a law of some other
+        shape they make up the class."""
         found = dict[str, float]()
         for m in self.members(kind, at):
-            found[m.cause] = found.get(m.cause, 0.0) + m.probability
+            found[m.cause] = found.get(m.cause, 0.0) + self.decision.probability(m.trial.key)
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
     def probability_of_effect(self, effect: Effect) -> float:

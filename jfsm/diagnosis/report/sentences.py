@@ -95,8 +95,10 @@ def _how_much(finding: Finding) -> str:
 
 
 def _laws(finding: Finding, known: Mapping[str, Cause]) -> str:
-    """The laws of a class with their probabilities in words."""
-    return ", ".join(f"{known[name].label} ({share:.0%})" for name, share in finding.members.items() if name in known)
+    """The laws of a class with their probabilities in words, and that of one that is none of them."""
+    laws = [f"{known[name].label} ({share:.0%})" for name, share in finding.members.items() if name in known]
+    other = finding.kind_probability - sum(finding.members.values())
+    return ", ".join([*laws, f"or one of another shape ({other:.0%})"] if other > RIVAL else laws)
 
 
 def _named(decision: Decision, winner: Trial, findings: Sequence[Finding], shape: Shape | None) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from ..._threads import compiled_once, side_by_side
 from ...identification import LADDER, LANES, Maximum, Posterior, finish, lanes_of, rungs, with_offsets
 from ...structures import AccelerationGain, ForceGain, Structure
-from ..evidence.fitted import Trial, trial
+from ..evidence.fitted import Trial, lane_left, trial
 from ..evidence.setup import Problem
 from ..hypotheses.candidate import Candidate
 from ..hypotheses.effect import Effect, families
@@ -22,6 +22,9 @@ FAR_BEHIND = 200.0
 """Nats behind the leader, one per cent of unmodelled force forgiven, from which a candidate is not pursued,"""
 _ALWAYS_PURSUED = 4
 """unless it is among the best of them."""
+_BLIND = 10.0
+"""Error power, in those of another start of the same effects, from which a start predicts nothing, whatever its
+evidence."""
 _FIRST = 2
 """Leaders whose tops are known before the others go on."""
 
@@ -99,6 +102,7 @@ class Batch:
         self.share = max(math.inf if candidate.share is None else candidate.share for candidate in candidates)
         self.program, self.behind = posteriors[0].program, math.inf
         self.limit, self.begun, self.candidates = problem.limit, False, candidates
+        self.imposed, self.left = problem.imposed, 0.0
         self.climb = self._climb(posteriors, candidates, lanes, ladder)
 
     def _climb(self, posteriors: Sequence[Posterior], candidates: tuple[Candidate, ...], lanes: int, ladder):
@@ -121,6 +125,8 @@ class Batch:
         """On to the next stage, unless the time is over."""
         if not self.limit.over:
             self.rung, self.begun = next(self.climb), True
+            if self.imposed:
+                self.left = lane_left(self.posterior, self.rung.theta, int(np.argmin(self.rung.value)))
         return self
 
     def top(self, best: float) -> list[Trial]:
@@ -209,7 +215,8 @@ def _at_their_tops(pursued: Sequence[Batch], best: float, tell: Tell) -> list[Tr
             done += 1
             tell("the best candidates", len(ranked) - done)
             trials += found
-        best = min([best, *(t.value for t in trials)])
+        if not any(batch.imposed for batch in together):
+            best = min([best, *(t.value for t in trials)])
     return best_of_each(trials)
 
 
@@ -225,19 +232,32 @@ def _left_behind(batches: Sequence[Batch], pursued: Sequence[Batch], trials: Seq
 
 
 def _near(batches: Sequence[Batch], least: int, leader: float = math.inf) -> list[Batch]:
-    """Those that are not hopelessly behind after the same stage, or among the `least` best."""
+    """Those that are not hopelessly behind after the same stage, or among the `least` best.
+
+    Along an imposed motion also those of the best predictions: a law that remembers may follow any force by what noise
+    of the motion does to it, and predict none.
+    """
     leader = min([leader, *(batch.best for batch in batches)])
     for batch in batches:
         batch.behind = batch.best - leader
     ranked = sorted(batches, key=lambda batch: batch.behind)
-    return [batch for rank, batch in enumerate(ranked) if rank < least or batch.behind < FAR_BEHIND]
+    predicting = sorted((batch for batch in batches if batch.imposed), key=lambda batch: batch.left)[:least]
+    best = [*ranked[:least], *predicting]
+    return [batch for batch in ranked if batch in best or batch.behind < FAR_BEHIND]
 
 
 def best_of_each(trials: Sequence[Trial]) -> list[Trial]:
-    """The most probable start of every cause at every place."""
+    """The most probable start of every cause at every place, of those that predict anything."""
     best: dict[tuple, Trial] = {}
     for t in trials:
         other = best.get(t.effects, t)
-        better = t if t.evidence > other.evidence else other
-        best[t.effects] = replace(better, rung=min(t.rung, other.rung))
+        best[t.effects] = replace(_better(t, other), rung=min(t.rung, other.rung))
     return list(best.values())
+
+
+def _better(one: Trial, other: Trial) -> Trial:
+    """The one that predicts, where the other does not; else the more probable one."""
+    left, rest = (float(np.sum(t.prediction.error)) for t in (one, other))
+    if max(left, rest) > _BLIND * min(left, rest):
+        return one if left < rest else other
+    return one if one.evidence > other.evidence else other

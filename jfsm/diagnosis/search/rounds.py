@@ -13,7 +13,7 @@ from ..channels.clock import in_its_time
 from ..channels.coloured_noise import coloured
 from ..channels.delays import gain_of_delay, seems_late, slightly_late
 from ..channels.drift import SLOWLY, wandering
-from ..evidence.excess import explained
+from ..evidence.excess import explained, is_noise_only
 from ..evidence.fitted import Trial
 from ..evidence.identifiable import in_step
 from ..evidence.lack_of_fit import LackOfFit
@@ -28,6 +28,8 @@ from .searches import search, search_akin, search_beside, search_known, search_p
 from .steps import Steps
 from .stopping import hidden, settled, something_left
 
+_TIMELY = 4
+"""Trials beside which a force is asked whether it acts at another time, the likeliest."""
 _STIFF = 8
 """Times the steps of the model that a law needs from which it is asked late: it costs as many times more."""
 
@@ -74,7 +76,7 @@ class Rounds:
         found = self._related(found)
         refitted = refit_from(found.trials, self.refitted, self.problem)
         louder, (given, refitted, *trials) = amid_noise(self.given, refitted, found.trials, self.problem, self.key)
-        singles = Searched(given, refitted, trials, found.behind, left_out, LackOfFit(self.problem))
+        singles = Searched(given, refitted, trials, found.behind, left_out, self._lack)
         if self._limit.over:
             return singles, None
         best = self._likeliest(singles.every)
@@ -90,6 +92,10 @@ class Rounds:
     @property
     def _limit(self) -> Limit:
         return self.problem.limit
+
+    @cached_property
+    def _lack(self) -> LackOfFit:
+        return LackOfFit(self.problem)
 
     @cached_property
     def _takes_the_drives_place(self) -> Callable[[Trial], bool]:
@@ -136,7 +142,7 @@ class Rounds:
     ) -> tuple[Found, list[Candidate]]:
         """What else is fitted. Once the best leaves only noise, that is what may be as good; else all of it, since
         regression may put the right law last if the missing force is poorly seen."""
-        if not settled(self._apart_from_the_drive([self.given, self.refitted, *found.trials])):
+        if not settled(self._apart_from_the_drive([self.given, self.refitted, *found.trials]), self._lack):
             return found, [c for c in others if c.starts] + slow
         best = max(found.trials, key=lambda t: t.evidence)
         late, behind = self._not_far_behind(late, best)
@@ -173,9 +179,16 @@ class Rounds:
         return found
 
     def _with_other_times(self, trials: Sequence[Trial]) -> Problem | None:
-        """The problem with the force at the times at which it turns out to act beside the best that has no delay."""
-        timely = [t for t in trials if not any(isinstance(part, ForceDelay | ChannelDelay) for part in t.parts)]
-        return in_its_time(self._likeliest(timely), self.problem, to_noise=False)
+        """The problem with the force at the times at which it turns out to act beside the best that has no delay, or
+        beside another one of the best where that leaves more than noise: what makes up for a late force comes first."""
+        known = self._apart_from_the_drive(trials)
+        timely = [t for t in known if not any(isinstance(part, ForceDelay | ChannelDelay) for part in t.parts)]
+        best, *others = sorted(timely, key=lambda t: -t.evidence)[:_TIMELY]
+        for t in (best, *(() if is_noise_only(best) else others)):
+            found = in_its_time(t, self.problem, to_noise=False, likeliest=best.evidence)
+            if found is not None or self._limit.over:
+                return found
+        return None
 
     def _with_other_noise(self, best: Trial) -> Problem | None:
         """The problem with the noise that a channel turns out to have beside the best; None where none has."""
@@ -229,7 +242,7 @@ class Rounds:
             return None
         found = search_beside(best, other, sensor, self.problem, self.steps.of("what is late"))
         slight = slightly_late(found.trials, {}, self.problem.first.record)
-        return found if slight and settled(found.trials) else None
+        return found if slight and settled(found.trials, self._lack) else None
 
 
 def amid_noise(

@@ -5,17 +5,29 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ...structures import AccelerationBias, AccelerationGain, ForceGain, Preload
-from ..evidence.excess import almost_all, is_noise_only, unexplained
+from ..evidence.excess import almost_all, is_noise_only, left, unexplained
 from ..evidence.fitted import Trial
 from ..evidence.own_values import offset_cost, prior_cost
 from ..evidence.scorecard import OtherShapes
 from ..thresholds import THRESHOLDS
 
 
-def settled(trials: Sequence[Trial]) -> bool:
-    """Whether the best of them leaves nothing but noise, its laws what they are called."""
+def settled(trials: Sequence[Trial], other_shapes: Callable[[Trial], OtherShapes]) -> bool:
+    """Whether no law can gain much over the best of them, whose laws are what they are called.
+
+    It leaves nothing but noise; or its innovations are not quite white, and still no force of any shape would explain
+    them.
+    """
     best = max(trials, key=lambda t: t.evidence)
-    return is_noise_only(best) and is_itself(best)
+    return is_itself(best) and (is_noise_only(best) or _has_the_shape(best, other_shapes))
+
+
+def _has_the_shape(t: Trial, other_shapes: Callable[[Trial], OtherShapes]) -> bool:
+    """Whether a law leaves nothing to see, and other shapes are known to gain nothing beside it."""
+    if not t.effects or left(t) >= THRESHOLDS.negligible:
+        return False
+    found = other_shapes(t)
+    return found.told and found.nats < THRESHOLDS.other_shapes_white
 
 
 def is_itself(t: Trial) -> bool:
@@ -36,9 +48,11 @@ def something_left(
     least = limits.other_shapes_white if noise_only else limits.other_shapes
     if best.effects and other_shapes(best).nats > least:
         return True
+    if left(best) < limits.negligible:
+        return False
     # One part of a decay may be too small to show the second effect: all parts tell together.
     much = np.sum(best.prediction.beyond()) >= limits.second_effect**2 * np.sum(refitted.prediction.error)
-    return bool(much and not noise_only and np.any(unexplained(best)))
+    return bool(much and np.any(unexplained(best)))
 
 
 def hidden(trials: Sequence[Trial]) -> tuple[type, ...]:

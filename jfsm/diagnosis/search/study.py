@@ -11,7 +11,7 @@ from ..._limit import Limit
 from ...identification import prepare_all
 from ...plant import Reconstruction
 from ...records import Record
-from ...structures import AttachedOscillator, Cause, DelayedForce, Maxwell, Structure
+from ...structures import AttachedOscillator, Cause, DelayedForce, ForceDelay, Maxwell, Structure
 from ..channels.clock import WAYS, in_its_time
 from ..channels.drift import PLAINLY, steadied, wandering
 from ..evidence.between_records import differ
@@ -132,9 +132,17 @@ class Study:
 
     def _candidates(self, problem: Problem) -> list[Candidate]:
         """What could be tried: not the delay of a force of which it is known."""
-        every = candidates(self.model, [steadied(n) for n in problem.records], self.chosen, self.places)
-        known = {("force_delay", channel) for channel in problem.first.late}
-        return [c for c in every if (c.effects[0].cause.id, c.effects[0].at) not in known]
+        known = problem.first.late
+        return [c for c in self._possible(problem, self.chosen) if not (_delays_force(c) and c.effects[0].at in known)]
+
+    def _delays(self, problem: Problem, other: Problem) -> list[Candidate]:
+        """The delays of forces that could be tried in a problem, and not in another one that knows them."""
+        delays = {name: cause for name, cause in self.chosen.items() if cause.effect is ForceDelay}
+        known = other.first.late.keys() - problem.first.late.keys()
+        return [c for c in self._possible(problem, delays) if c.effects[0].at in known] if known and delays else []
+
+    def _possible(self, problem: Problem, chosen: dict[str, Cause]) -> list[Candidate]:
+        return candidates(self.model, [steadied(n) for n in problem.records], chosen, self.places)
 
     def _lags(self, late: Studied, problem: Problem, given: Trial, refitted: Trial) -> bool:
         """Whether a law by which the structure lags is likelier than a late force, beside which nothing was found."""
@@ -157,14 +165,20 @@ class Study:
         if best.effects and not self.limit.over:
             again = search_again([best], refitted, problem, self.steps.of("the best without that")).trials
             if again and again[0].evidence >= best.evidence:
-                found_again = self._fitted_again(found, given, refitted, problem)
+                untried = self._delays(problem, other)
+                found_again = self._fitted_again(found, given, refitted, problem, untried)
                 if not self.limit.over:
-                    return problem, every, found_again
+                    return problem, every + untried, found_again
         return other, every, found
 
-    def _fitted_again(self, ahead: Searched, given: Trial, refitted: Trial, problem: Problem) -> Searched:
-        """The best of what was found in another problem, as in pieces of long records, fitted from there."""
+    def _fitted_again(
+        self, ahead: Searched, given: Trial, refitted: Trial, problem: Problem, untried: Sequence[Candidate] = ()
+    ) -> Searched:
+        """The best of what was found in another problem, as in pieces of long records, fitted from there; and what was
+        no candidate there."""
         found = search_again(ahead.trials, refitted, problem, self.steps.of("the best again"))
+        if untried:
+            found = found.and_then(search(untried, given, refitted, problem, self.steps.of("the force's delay")))
         refitted = refit_from(found.trials, refitted, problem)
         _, (given, refitted, *trials) = amid_noise(given, refitted, found.trials, problem, self.key)
         return ahead.judged_in(problem, given, refitted, trials)
@@ -190,6 +204,10 @@ class Study:
                     break
                 problem, found = another, again
         return problem, found
+
+
+def _delays_force(candidate: Candidate) -> bool:
+    return candidate.effects[0].cause.effect is ForceDelay
 
 
 def shows_later(trials: Sequence[Trial]) -> bool:

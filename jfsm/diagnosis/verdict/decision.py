@@ -126,18 +126,14 @@ class Decision:
     @classmethod
     def of_plain(cls, written: Mapping[str, Any]) -> "Decision":
         """What `plain` was made of."""
-
-        def check(row: Mapping[str, Any]) -> Check:
-            return Check(**{**row, "measured": float(row["measured"]), "threshold": float(row["threshold"])})
-
         stopped = written["stopped_by"]
         made = {
-            "checks": tuple(check(row) for row in written["checks"]),
+            "checks": tuple(map(Check.of_plain, written["checks"])),
             "factors": {
                 k: tuple(Factor(f["name"], float(f["size"])) for f in v) for k, v in written["factors"].items()
             },
             "explained": {k: float(v) for k, v in written["explained"].items()},
             "near": tuple(written["near"]),
-            "stopped_by": None if stopped is None else check(stopped),
+            "stopped_by": None if stopped is None else Check.of_plain(stopped),
         }
         return cls(**{**written, **made})

@@ -27,12 +27,23 @@ from .right_shape import WRONG_SHAPE
 
 
 def judge(evidence: Evidence, limits: Thresholds = THRESHOLDS) -> Decision:
-    """The verdict that follows from the evidence, with every check that led to it.
+    """The verdict that follows from the evidence, with every check that led to it."""
+    return after_looks(judge_in_sign(evidence, limits), evidence)
+
+
+def judge_in_sign(evidence: Evidence, limits: Thresholds = THRESHOLDS) -> Decision:
+    """The verdict on all but what was looked at before: the signs of the channels are right.
 
     It is reached anew where predictions over some periods make the model consistent and a run over all held-out
     readings does not.
     """
     return beside_late_forces(_judged(evidence, limits), evidence.setting, limits)
+
+
+def after_looks(decision: Decision, evidence: Evidence) -> Decision:
+    """The verdict with what was looked at before it; a channel of the wrong sign is a cause, whatever else is."""
+    decision = decision.after(evidence.looks)
+    return replace(decision, verdict="cause", stopped_by=None) if evidence.setting.turned else decision
 
 
 def _judged(evidence: Evidence, limits: Thresholds) -> Decision:
