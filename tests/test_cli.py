@@ -20,6 +20,7 @@ from typer.testing import CliRunner, Result
 
 from jfsm import Polynomial, Record, Structure, load_map, read
 from jfsm.cli import app
+from jfsm.cli._input import in_options
 from jfsm.diagnosis import Proposal
 
 MASS, STIFFNESS, DAMPING = 2.0, 1800.0, 3.0
@@ -77,8 +78,8 @@ class FakeDiagnosis(SimpleNamespace):
 
     finished = True
 
-    def print(self) -> None:
-        print(f"verdict: {self.verdict}")
+    def print(self, units: Any = None) -> None:
+        print(f"verdict: {self.verdict}{f' in {units}' if units else ''}")
 
 
 def answer(monkeypatch, verdict: str = "consistent") -> dict[str, Any]:
@@ -116,7 +117,22 @@ def test_of_a_record_the_part_between_two_instants_is_read(channels):
     assert "500 samples" not in result.stdout and "are kept, t = 1 to 3 s" in flat(result.stdout)
     result = run("inspect", *channels, "--since", 1000.0)
     assert result.exit_code == 2
-    assert "`since` and `until` must keep at least 2 samples" in flat(result.stderr)
+    assert "--since and --until must keep at least 2 samples" in flat(result.stderr)
+
+
+def test_results_are_shown_in_the_units_that_are_asked_for(channels, folder, tmp_path, monkeypatch):
+    page, table = tmp_path / "page.html", re.compile(r"displacement 1 +in\b")
+    result = run("inspect", *channels, "--out-units", "in,lbf", "--report", page)
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert table.search(result.stdout) and re.search(r"force 1 +lbf\b", result.stdout) and ">lbf<" in page.read_text()
+    result = run("inspect", *channels, "--out-units", "given")
+    assert re.search(r"displacement 1 +mm\b", result.stdout)
+    assert "--out-units must be units of length" in refusal("inspect", *channels, "--out-units", "furlong")
+    answer(monkeypatch)
+    result = run("diagnose", *channels, "--model", folder / "model.toml", "--out-units", "in,lbf")
+    assert "consistent in in,lbf" in result.stdout
+    text = refusal("diagnose", *channels, "--model", folder / "model.toml", "--out-units", "in,mm")
+    assert "in and mm both stand for m" in text
 
 
 def test_an_inspection_is_written_as_a_page(channels, tmp_path):
@@ -337,7 +353,6 @@ def test_an_unknown_channel_is_named_beside_those_that_exist(folder):
         (["--displacement", "y", "--where", "t=0", "--where", "t=1"], "each column once; it was t=0, t=1."),
         (["--displacement", "y", "--where", "run=3"], "--where must name a channel of run.csv"),
         (["--displacement", "0=y"], "dof"),
-        ([], "must be told which channel is what"),
     ],
 )
 def test_channel_options_that_mean_nothing_are_refused(options, words, folder):
@@ -389,7 +404,7 @@ def test_a_holdout_that_is_neither_share_nor_file_is_refused(channels, folder):
     text = refusal("diagnose", *channels, "--model", folder / "model.toml", "--holdout", "some")
     assert "--holdout must be a share such as 0.3, none, or files; it was 'some'." in text
     text = refusal("diagnose", *channels, "--model", folder / "model.toml", "--holdout", "1.5")
-    assert "`holdout` as a share must lie between 0 and 1" in text
+    assert "--holdout as a share must lie between 0 and 1" in text
 
 
 @pytest.mark.parametrize(
@@ -454,19 +469,26 @@ def test_a_motion_that_runs_away_is_not_written(folder, channels, tmp_path):
 def test_a_fit_is_printed_with_intervals_and_written_as_a_model(channels, folder, tmp_path):
     out = tmp_path / "fitted.toml"
     given = Structure.load(folder / "stiff.toml").values()
-    result = run("fit", *channels, "--at-rest", "--model", folder / "stiff.toml", "--out", out, "--fixed", "mass")
+    command = ("fit", *channels, "--at-rest", "--model", folder / "stiff.toml", "--out", out, "--fixed", "mass")
+    result = run(*command, "--out-units", "in")
     assert (result.exit_code, result.stderr) == (0, "")
     fitted = Structure.load(out).values()
     assert fitted["mass@1"] == given["mass@1"]
     assert fitted["stiffness@0-1.k"] == pytest.approx(STIFFNESS, rel=0.01)
-    assert "stiffness@0-1.k" in result.stdout and "N/m" in result.stdout and "mass@1" not in result.stdout
+    assert "stiffness@0-1.k" in result.stdout and "mass@1" not in result.stdout
+    shown = re.search(r"stiffness@0-1\.k +\S+ +(\S+) .*N/in", result.stdout)
+    assert shown and float(shown[1]) == pytest.approx(STIFFNESS * 0.0254, rel=0.01)
+    hertz = re.search(r"mode 1, frequency +(\S+) .*Hz", result.stdout)
+    assert hertz and float(hertz[1]) == pytest.approx(math.sqrt(STIFFNESS / MASS) / (2 * math.pi), rel=0.005)
+    share = re.search(r"mode 1, damping ratio +(\S+) .*%", result.stdout)
+    assert share and float(share[1]) == pytest.approx(50 * DAMPING / math.sqrt(STIFFNESS * MASS), rel=0.1)
 
 
 def test_a_name_that_cannot_be_fixed_is_refused(channels, folder, tmp_path):
     text = refusal(
         "fit", *channels, "--model", folder / "model.toml", "--out", tmp_path / "fitted.toml", "--fixed", "colour"
     )
-    assert "`fixed` names 'colour', which the structure does not have" in text
+    assert "--fixed names 'colour', which the structure does not have" in text
     assert not (tmp_path / "fitted.toml").exists()
 
 
@@ -567,13 +589,13 @@ def test_a_force_is_mapped_printed_shown_and_written(channels, folder, tmp_path)
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ([], "`model` or `mass` must be given, and not both"),
-        (["--mass", 2.0, "--model", "model.toml"], "`model` or `mass` must be given, and not both"),
+        ([], "--model or --mass must be given, and not both"),
+        (["--mass", 2.0, "--model", "model.toml"], "--model or --mass must be given, and not both"),
         (["--mass", -2.0], "`mass` must be positive; got -2"),
         (["--mass", 2.0, "--at", "1"], "--at must be two degrees of freedom, as 0-1, where 0 is ground; it was '1'."),
-        (["--mass", 2.0, "--at", "1-2"], "`model` must be given for the link (1, 2)"),
-        (["--mass", 2.0, "--method", "splines"], '`method` must be "rkpm", "kriging" or "joint"; got \'splines\'.'),
-        (["--mass", 2.0, "--order", 0], "`order` must be an integer of 1 or more; got 0."),
+        (["--mass", 2.0, "--at", "1-2"], "--model must be given for the link (1, 2)"),
+        (["--mass", 2.0, "--method", "splines"], '--method must be "rkpm", "kriging" or "joint"; got \'splines\'.'),
+        (["--mass", 2.0, "--order", 0], "--order must be an integer of 1 or more; got 0."),
         (["--mass", 2.0, "--out", "run.csv"], "--out must not be a file that is needed"),
     ],
 )
@@ -702,7 +724,6 @@ def test_refusals_of_a_file_speak_of_options(tmp_path):
     assert line.endswith("Pass --run 1 or another.")
     (tmp_path / "b.csv").write_text("F,x\n1,2\n2,3\n3,4\n")
     assert refusal("inspect", tmp_path / "b.csv", "--force", "F").endswith("Pass --time NAME or --rate HZ.")
-    assert "as --force NAME, --displacement NAME" in refusal("inspect", tmp_path / "b.csv", "--rate", 10)
     (tmp_path / "c.csv").write_text("t,F [EU]\n1,2\n2,3\n3,4\n")
     assert "Say which is meant by --unit 'F=UNIT'" in refusal("inspect", tmp_path / "c.csv", "--force", "F")
     uneven = "".join(f"{i + 0.3 * (i % 2)},{i}\n" for i in range(12))
@@ -710,6 +731,8 @@ def test_refusals_of_a_file_speak_of_options(tmp_path):
     Structure.sdof(1.0, 9.0, 0.1).save(tmp_path / "m.toml")
     options = ["--force", "F", "--model", tmp_path / "m.toml", "--out", tmp_path / "o.csv"]
     assert "Make them so first: --resample " in refusal("simulate", tmp_path / "d.csv", *options)
+    text = refusal("simulate", tmp_path / "b.csv", *options[2:], "--rate", 10)
+    assert "as --force NAME, --displacement NAME" in text
 
 
 def test_runs_sensitivities_cuts_and_rates_are_options(tmp_path):
@@ -734,3 +757,78 @@ def test_a_package_that_is_missing_is_a_refusal(tmp_path, monkeypatch):
     monkeypatch.setattr("jfsm.records.formats.base.importlib.import_module", missing)
     (tmp_path / "a.tdms").write_bytes(b"TDSm" + bytes(40))
     assert "pip install jfsm[tdms]" in refusal("inspect", tmp_path / "a.tdms", "--force", "F")
+
+
+def test_a_file_that_says_nothing_of_its_channels_is_listed_with_the_command_to_go_on_with(tmp_path):
+    rows = "".join(f"{0.01 * i:.2f},{i},{2 * i},{3 - i},{i % 7}\n" for i in range(40))
+    path = tmp_path / "press run.log"
+    path.write_text("time [s],Kraft [kN],Weg [mm],LVDT (V),temp [C]\n" + rows)
+    result = run("inspect", path)
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert re.search(r"Kraft +kN +force +40 +100 +0.39 +0 +39\b", result.stdout)
+    assert re.search(r"LVDT +V +displacement +40 +100 +0.39 +-36 +3\b", result.stdout)
+    assert re.search(r"temp +C +- +40 ", result.stdout)
+    proposal = " ".join(result.stdout.partition("To go on: ")[2].split())
+    assert proposal == (
+        f"jfsm diagnose '{path}' --force Kraft --displacement Weg --displacement LVDT --model MODEL.toml"
+    )
+    text = refusal("inspect", path, "--report", tmp_path / "page.html")
+    assert f"jfsm inspect '{path}' --force Kraft --displacement Weg" in text
+
+
+def test_a_file_without_a_clock_is_listed_with_what_is_missing(tmp_path):
+    (tmp_path / "b.csv").write_text("aux,other\n1,2\n2,3\n3,4\n")
+    words = flat(run("inspect", tmp_path / "b.csv").stdout)
+    assert "Pass --time NAME or --rate HZ." in words and "Add --force NAME, --displacement NAME" in words
+
+
+def test_an_inspection_ends_with_the_command_to_go_on_with(channels, folder):
+    result = run("inspect", *channels, "--until", 3.0, "--at-rest")
+    assert " ".join(result.stdout.split()).endswith(
+        f"To go on: jfsm diagnose {folder / 'run.csv'} --force u --displacement y --unit u=N --unit y=mm --until 3.0 "
+        f"--at-rest --model MODEL.toml"
+    )
+
+
+def test_every_so_manieth_sample_is_kept_without_aliasing(channels):
+    result = run("inspect", *channels, "--every", 5)
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert "100 samples" in flat(result.stdout)
+    assert f"Resampled from {RATE:.6g} to {RATE / 5:.6g} Hz" in flat(result.stdout)
+    text = refusal("inspect", *channels, "--every", 5, "--resample", "auto")
+    assert "--every must be a whole number from 1 on, and given without --resample; it was 5 beside" in text
+    assert "it was 0. Give one" in refusal("inspect", *channels, "--every", 0)
+
+
+def test_what_is_noted_is_said_in_options(tmp_path):
+    rows = "".join(f"{0.01 * i:.2f},{i % 5}\n" for i in range(40))
+    (tmp_path / "a.csv").write_text("time [s],force_kN\n" + rows)
+    words = flat(run("inspect", tmp_path / "a.csv", "--force", "force_kN").stdout)
+    assert "by its name; --unit says otherwise" in words
+
+
+@pytest.mark.parametrize("command", ["inspect", "simulate", "fit", "diagnose", "map"])
+def test_every_command_that_reads_takes_the_same_options(command):
+    shown = run(command, "--help").stdout
+    for option in "time rate unit where sensitivity run sheet since until resample every".split():
+        assert f"--{option}" in shown
+
+
+@pytest.mark.parametrize(
+    ("message", "words"),
+    [
+        ("`since` and `until` must keep", "--since and --until must keep"),
+        ('`record` has drive="motion"; here', "RECORD has --drive motion; here"),
+        ("State it: units={...}.", "State it: --unit NAME=UNIT."),
+        ("`max_causes` must be at least 1", "--max-causes must be at least 1"),
+        ("`time_limit` must be positive", "--time-limit must be positive"),
+        ("`causes` must name causes", "--cause must name causes"),
+        ("made with `at_rest=True`;", "made with --at-rest;"),
+        ("the first is used. Pass time='t 2' if", "the first is used. Pass --time 't 2' if"),
+        ("to one clock by jfsm.align(records); or", "to one clock by jfsm.align(records) in Python; or"),
+        ("`model` must hold no friction", "--model must hold no friction"),
+        ("`holdout` as a share must", "--holdout as a share must"),
+    ],
+)
+def test_messages_name_options(message, words):
+    assert in_options(message) == words

@@ -168,3 +168,36 @@ def test_what_makes_no_one_record_is_refused(second, message):
 def test_a_rate_that_is_none_is_refused(rate):
     with pytest.raises(ValueError, match="`rate` must be a positive number of samples per second"):
         jfsm.align([whole()], rate)
+
+
+DAY = "2024-03-05T14:30:0"
+
+
+def test_clocks_with_dates_are_put_together_by_them():
+    """Both read zero at their own first sample, three seconds apart."""
+    force = Record(T[:2000], force=wave(T[:2000]), name="A").dated(DAY + "0.5")
+    motion = Record(T[:2000], displacement=wave(T[300:2300]), name="B").dated(DAY + "3.5")
+    both = jfsm.align([force, motion])
+    assert (both.time[0], both.time[-1]) == pytest.approx((3.0, T[1999]), abs=1e-9)
+    np.testing.assert_allclose(both.channels["force", 1], both.channels["displacement", 1], atol=1e-9)
+    assert both.begins == force.begins
+    told = "The clock of 'B' reads zero 3 s after that of 'A', by the dates of both; it is put forward."
+    assert told in both.notes
+    other = jfsm.align([motion, force])
+    np.testing.assert_allclose(other.channels["force", 1], other.channels["displacement", 1], atol=1e-9)
+    assert any("3 s before" in note for note in other.notes)
+    as_read = jfsm.align([force, motion.dated(None)])
+    assert as_read.time[0] == 0 and any("Only 'A' says when" in note for note in as_read.notes)
+
+
+def test_clocks_whose_dates_share_no_time_are_refused_with_the_difference():
+    force = Record(T, force=wave(T), name="A").dated("2024-03-05T14:30")
+    motion = Record(T, displacement=wave(T), name="B").dated("2024-03-05T15:30:00.25")
+    with pytest.raises(ValueError, match=r"zero 3600\.25 s after that of 'A'.*record\.dated\(None\)"):
+        jfsm.align([force, motion])
+
+
+def test_pieces_with_dates_are_joined_by_them():
+    record = Record(T, force=wave(T)).dated(DAY + "0")
+    second = Record(T[:1000], force=wave(T[2000:])).dated("2024-03-05T14:30:20")
+    np.testing.assert_allclose(jfsm.join([record[:2000], second]).time, T, atol=1e-9)

@@ -2,11 +2,13 @@
 
 import gc
 import importlib
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from jfsm.records import Record, read
+from jfsm.records import Record, align, read
 
 T = np.arange(100) * 0.02
 U = np.cos(3.0 * T)
@@ -68,13 +70,15 @@ def test_a_tdms_file_that_is_cut_short_is_refused(tmp_path, kept):
         read(path, force="run/F")
 
 
-def _mdf(path):
+def _mdf(path, begun=None, version="4.10"):
     asammdf = pytest.importorskip("asammdf")
-    with asammdf.MDF(version="4.10") as file:
+    with asammdf.MDF(version=version) as file:
+        if begun is not None:
+            file.header.start_time = begun
         file.append([asammdf.Signal(U, T, name="F", unit="kN"), asammdf.Signal(2 * U, T, name="A", unit="g")])
         file.append([asammdf.Signal(U[:50], 2 * T[:50], name="A", unit="g")])
-        file.save(path)
-    return path
+        written = file.save(path.with_suffix(".mf4" if version[0] == "4" else ".mdf"), overwrite=True)
+    return Path(written).rename(path)
 
 
 def test_channels_of_an_mdf_file_have_names_units_and_clocks(tmp_path):
@@ -85,6 +89,19 @@ def test_channels_of_an_mdf_file_have_names_units_and_clocks(tmp_path):
     np.testing.assert_array_equal(record.channels["acceleration", 1], 9.80665 * (2 * U))
     with pytest.raises(ValueError, match=r"channels of one clock .*'F' has 100 samples .*'A \(3\)' has 50 samples"):
         read(path, force="F", acceleration="A (3)")
+
+
+@pytest.mark.parametrize("version", ["4.10", "3.30"])
+def test_files_of_mdf_that_began_apart_are_put_on_one_clock(version, tmp_path):
+    pytest.importorskip("asammdf")
+    begun = datetime(2024, 3, 5, 14, 30, tzinfo=UTC)
+    first = read(_mdf(tmp_path / "a.mf4", begun, version), force="F")
+    late = read(_mdf(tmp_path / "b.dat", begun + timedelta(seconds=0.25), version), acceleration="A")
+    assert first.begins is not None and late.begins is not None
+    assert (late.begins - first.begins) / np.timedelta64(1, "ms") == 250
+    both = align([first, late])
+    assert both.time[0] == pytest.approx(0.25, abs=1e-9)
+    assert any("reads zero 0.25 s after that of 'a'" in note for note in both.notes)
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # of the half-made file of asammdf

@@ -26,7 +26,10 @@ def test_channels_are_chosen_by_name_and_brought_to_coherent_units():
     np.testing.assert_allclose(record.time, T, atol=1e-14)
     np.testing.assert_allclose(record.channels["force", 1], 1e3 * U, rtol=1e-14)
     np.testing.assert_allclose(record.channels["acceleration", 2], 9.80665 * Y, rtol=1e-14)
-    assert (record.at_rest, record.notes) == (True, (f"Measured from {begun}.",))
+    assert (record.at_rest, record.notes) == (
+        True,
+        ("The clock reads zero at 2023-06-29 15:00:00.000000000.",),
+    )
 
 
 def test_without_names_the_quantity_says_what_a_channel_is():
@@ -85,3 +88,12 @@ def test_channels_given_out_pass_the_validator_of_the_proposal():
 def test_channels_that_make_no_record_are_refused(channels, error, message):
     with pytest.raises(error, match=message):
         Record.from_sep005(channels, force="u", displacement="y")
+
+
+def test_channels_that_began_apart_are_not_put_side_by_side():
+    early = _channel("F1", U, start_timestamp="2023-06-29T15:00:00+00:00")
+    late = _channel("A1", Y, start_timestamp="2023-06-29T17:00:03.5+02:00")
+    with pytest.raises(ValueError, match=r"from 0 to 1\.98 s, 'A1' has 100 samples from 3\.5 to 5\.48 s.*3\.5 s apart"):
+        Record.from_sep005([early, late], force="F1", acceleration="A1")
+    record = Record.from_sep005([early, late], acceleration="A1")
+    assert record.time[0] == 3.5 and record.begins == np.datetime64("2023-06-29T15:00:00")

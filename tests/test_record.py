@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from jfsm.records import Record
+from jfsm.records import Record, read
 
 T = np.arange(200) * 0.01
 X = np.sin(2 * np.pi * 3.0 * T)
@@ -272,7 +272,39 @@ def test_resampling_makes_uneven_time_even_whatever_the_spacing():
 def test_a_gap_that_was_bridged_is_noted_even_where_the_rate_stays():
     t = np.delete(np.arange(400) * 0.01, slice(200, 203))
     other = Record(t, displacement=_signal(t)).resample(100.0)
-    assert other.notes[-1].endswith("by cubic interpolation of uneven samples with gaps of up to 0.04 s.")
+    assert "by cubic interpolation of uneven samples with gaps of up to 0.04 s." in other.notes[-1]
+
+
+def test_in_a_long_gap_nothing_is_known():
+    """Of ten samples that are missing, none is made up: those between are marked; two are bridged."""
+    whole = np.arange(600) * 0.01
+    kept = np.ones(600, dtype=bool)
+    kept[100:102] = kept[300:310] = False
+    t = whole[kept]
+    other = Record(t, force=_signal(t), displacement=_signal(t)).resample(100.0)
+    np.testing.assert_allclose(other.time, whole, atol=1e-9)
+    for key, samples in other.channels.items():
+        np.testing.assert_array_equal(np.flatnonzero(other.lost[key]), np.arange(300, 310))
+        np.testing.assert_allclose(samples[:299], _signal(whole[:299]), atol=3e-3)
+        np.testing.assert_allclose(samples[311:], _signal(whole[311:]), atol=3e-3)
+    note = other.notes[-1]
+    assert "Within 1 gap of more than two samples, 0.11 s in all, the first from t = 2.99 s on, 10 samples" in note
+    assert "The force is not known there either." in note
+    half = Record(t, displacement=_signal(t)).resample(50.0)
+    np.testing.assert_array_equal(np.flatnonzero(half.lost["displacement", 1]), np.arange(150, 155))
+
+
+def test_the_date_at_which_the_clock_reads_zero_is_kept(tmp_path):
+    record = Record(T, force=X).dated("2024-03-05T14:30:00.000001")
+    assert record.begins == np.datetime64("2024-03-05T14:30:00.000001")
+    for other in (record[5:], record.noted("a"), record.resample(50.0), record.shifted(3.0)):
+        assert other.begins == record.begins
+    for suffix in ("csv", "npz", "mat", "h5", "uff"):
+        record.write(tmp_path / f"a.{suffix}")
+        assert read(tmp_path / f"a.{suffix}").begins == record.begins
+    assert record.dated(None).begins is None and Record(T).begins is None
+    with pytest.raises(ValueError, match="`begins` must be a date.*it was 'today-ish'"):
+        record.dated("today-ish")
 
 
 def test_resampling_sees_through_time_stamps_that_were_rounded():

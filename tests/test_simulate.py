@@ -1,5 +1,6 @@
 """Free runs: against SciPy, against what physics demands, and what is refused."""
 
+import dataclasses
 import functools
 
 import jax.numpy as jnp
@@ -468,3 +469,21 @@ def test_what_cannot_be_run_is_refused_with_the_reason(model, record, options, m
 def test_a_record_of_another_size_of_structure_names_the_force_that_has_no_place():
     with pytest.raises(ValueError, match="`record` names degree of freedom 2"):
         jfsm.simulate(MODEL, CHAIN_RECORD)
+
+
+def test_a_response_is_a_record_that_drives_the_same_run():
+    time = np.arange(300) * 0.01
+    record = jfsm.Record(
+        time, 1e-3 * np.sin(7 * time), units={"force": "kN", "displacement": "mm"}, at_rest=True, name="rig"
+    )
+    model = jfsm.Structure.sdof(mass=1.0, stiffness=90.0, damping=0.4)
+    response = jfsm.simulate(model, record)
+    again = response.to_record()
+    np.testing.assert_array_equal(again.channels["displacement", 1], response.displacement[:, 0])
+    np.testing.assert_array_equal(again.channels["force", 1], record.channels["force", 1])
+    assert (again.at_rest, again.name, again.units["force"]) == (True, "rig, simulated", record.units["force"])
+    np.testing.assert_array_equal(jfsm.simulate(model, again).displacement, response.displacement)
+    other = jfsm.simulate(model, record, force=2 * record.channels["force", 1]).to_record()
+    np.testing.assert_allclose(other.channels["force", 1], 2 * record.channels["force", 1])
+    with pytest.raises(ValueError, match="made by hand"):
+        dataclasses.replace(response, _record=None).to_record()

@@ -346,7 +346,7 @@ def test_14_units_of_recorders_are_known(tmp_path, head, factor):
         (
             "a.tdm",
             b"PK\x03\x04" + bytes(26) + b"data.tdx" + bytes(50),
-            "is a zip archive, which is not read. Unpack it",
+            "is a DIAdem file, which is not read. Export it",
         ),
     ],
 )

@@ -13,16 +13,18 @@ from ._input import (
     RecordFile,
     RecordFiles,
     Seed,
+    ShownUnits,
     Units,
     check_outputs,
     link,
     load,
     option,
     random_key,
+    shown_units,
     takes_record,
     units,
 )
-from ._output import progress, say, show_table
+from ._output import progress, said_in_options, say, show_listing, show_table
 
 if TYPE_CHECKING:
     import jax
@@ -33,13 +35,25 @@ if TYPE_CHECKING:
 
 @command
 @takes_record
-def inspect(source: RecordFile, report: Annotated[Path | None, option("Write the page here, as HTML.")] = None) -> None:
-    """Show what a record holds, and what is odd about it."""
+def inspect(
+    source: RecordFile,
+    report: Annotated[Path | None, option("Write the page here, as HTML.")] = None,
+    out_units: ShownUnits = None,
+) -> None:
+    """Show what a record holds, and what is odd about it; of a file whose channels have no kinds, the channels."""
     check_outputs({"--report": report}, [source.record])
-    inspection = source.read().inspect()
+    if (found := source.listing(source.record)) is not None:
+        if report is not None:
+            raise ValueError(f"--report needs channels: {source.proposal('inspect', found.proposed)}")
+        show_listing(found, source.proposal("diagnose", found.proposed))
+        return
+    record = source.read()
+    units, inspection = shown_units(out_units, record), record.inspect()
     if report is not None:
-        inspection.report(report)
-    inspection.print()  # last, so that a reader who closes the pipe loses no file
+        inspection.report(report, units)
+    with said_in_options():
+        inspection.print(units)  # last, so that a reader who closes the pipe loses no file
+    typer.echo(f"To go on: {source.proposal('diagnose')}")
 
 
 @command
@@ -54,7 +68,6 @@ def simulate(
     With --drive motion, the force that the record's motion needs.
     """
     from ..dynamics import simulate
-    from ..records import Record
 
     check_outputs({"--out": out}, [source.record, model])
     record = source.read()
@@ -62,19 +75,7 @@ def simulate(
     if not response.result.ok:
         say(f"At t = {response.escape_time:.6g} s {response.result.value}. Nothing was written.")
         raise typer.Exit(NOT_FINISHED)
-    forces = {dof: samples for (kind, dof), samples in record.channels.items() if kind == "force"}
-    Record(
-        response.time,
-        force=(forces or None) if response.force is None else response.force,
-        displacement=response.displacement,
-        velocity=response.velocity,
-        acceleration=response.acceleration,
-        base_acceleration=record.base_acceleration,
-        units=record.units,
-        at_rest=record.at_rest,
-        drive=record.drive,
-        name=f"{record.name}, simulated",
-    ).write(out)
+    response.to_record().write(out)
     what = "motion" if response.force is None else "force of the motion"
     typer.echo(f"The {what} of {len(response.time)} samples is in {out}.")
 
@@ -86,21 +87,37 @@ def fit(
     model: ModelFile,
     out: Annotated[Path, option("Write the fitted model here, as TOML.")],
     fixed: Annotated[list[str] | None, option("What stays as it is: mass, stiffness@0-1.k; repeatable.")] = None,
+    out_units: ShownUnits = None,
 ) -> None:
     """Fit a model's own values to a record, or to several at once."""
     from ..identification import fit
+    from ..records import out_units as units_of
+    from ..reporting import in_shown_unit, shown_in
 
     check_outputs({"--out": out}, [*source.records, model])
     records, given = source.read(), load(model)
+    asked = shown_units(out_units, records[0])
     with progress() as tell:
         tell("fitting", 0, 1)
         found = fit(given, records, fixed=tuple(fixed or ()))
     rows, in_units = [], records[0].units
     for path, value in found.values.items():
-        unit = given.entries()[path][0].unit(in_units["force"], in_units["displacement"])
         low, high = found.intervals[path]
-        rows.append((path, f"{given.values()[path]:.6g}", f"{value:.6g}", f"[{low:.6g}, {high:.6g}]", unit))
+        with shown_in(units_of(asked)):
+            size, unit = in_shown_unit(given.entries()[path][0].unit(in_units["force"], in_units["displacement"]))
+        before, value, low, high = (f"{each / size:.6g}" for each in (given.values()[path], value, low, high))
+        rows.append((path, before, value, f"[{low}, {high}]", unit))
     show_table("Fitted values", ("value", "given", "fitted", "95 % interval", "unit"), rows)
+    modes = [
+        (f"mode {number}, {what}", f"{size * one.value:.6g}", f"[{size * one.low:.6g}, {size * one.high:.6g}]", unit)
+        for number, mode in enumerate(found.modes, start=1)
+        for what, one, size, unit in (
+            ("frequency", mode.frequency, 1, "Hz"),
+            ("damping ratio", mode.damping_ratio, 100, "%"),
+        )
+    ]
+    if modes:
+        show_table("Frequency and damping", ("linear part", "fitted", "95 % interval", "unit"), modes)
     for words in (*found.identifiability, *filter(None, [found.missing])):
         typer.echo(words)
     found.structure.save(out)
@@ -136,6 +153,7 @@ def diagnose(
         float | None, option("Seconds after which the best verdict so far is given; so does Ctrl-C.", "SECONDS")
     ] = None,
     key: Seed = None,
+    out_units: ShownUnits = None,
 ) -> None:
     """Say what a model gets wrong about a record, why, and what mending it is worth.
 
@@ -146,6 +164,7 @@ def diagnose(
     inputs = [*source.records, model, *(Path(text) for text in holdout or ())]
     check_outputs({"--report": report, "--json": json, "--extended": extended}, inputs)
     records, held, believed = source.read(), source.held_out(holdout), load(model)
+    units = shown_units(out_units, records[0])
     with progress() as tell:
         d = diagnose(
             records,
@@ -158,12 +177,13 @@ def diagnose(
             progress=tell,
         )
     if report is not None:
-        d.report(report)
+        d.report(report, units)
     if json is not None:
         d.to_json(json)
     if extended is not None:
         d.extended.save(extended)
-    d.print()  # last, so that a reader who closes the pipe loses no file
+    with said_in_options():
+        d.print(units)  # last, so that a reader who closes the pipe loses no file
     if why:
         typer.echo(d.why())
     if not d.finished:
@@ -187,6 +207,7 @@ def map(
     order: Annotated[int | None, option("Order of its polynomials; chosen by the readings without it.")] = None,
     out: Annotated[Path | None, option("Write the map here, as npz.")] = None,
     report: Annotated[Path | None, option("Write the page here, as HTML.")] = None,
+    out_units: ShownUnits = None,
 ) -> None:
     """Map the force of a record, or what a model lacks of it, over displacement and velocity."""
     from ..mapping import map_force
@@ -194,14 +215,16 @@ def map(
     inputs = [source.record] if model is None else [source.record, model]
     check_outputs({"--out": out, "--report": report}, inputs)
     record, believed, place = source.read(), None if model is None else load(model), link(at)
+    units = shown_units(out_units, record)
     with progress() as tell:
         tell("the motion and the map", 0, 1)
         found = map_force(record, believed, mass, place, method, order)
     if out is not None:
         found.force_map.save(out)
     if report is not None:
-        found.report(report)
-    found.print()  # last, so that a reader who closes the pipe loses no file
+        found.report(report, units)
+    with said_in_options():
+        found.print(units)  # last, so that a reader who closes the pipe loses no file
 
 
 @command
@@ -210,12 +233,15 @@ def report(
         Path, typer.Argument(metavar="JSON", help="What `jfsm diagnose --json` wrote.", show_default=False)
     ],
     report: Annotated[Path, option("Write the page here, as HTML.")],
+    out_units: ShownUnits = None,
 ) -> None:
     """Make the page of a diagnosis again from its numbers."""
-    from ..reporting import render_json, write_text_atomically
+    from ..records import out_units as units_of
+    from ..reporting import render_json, shown_in, write_text_atomically
 
     check_outputs({"--report": report}, [numbers])
-    write_text_atomically(report, render_json(numbers))
+    with shown_in(units_of(shown_units(out_units))):
+        write_text_atomically(report, render_json(numbers))
     typer.echo(f"The page is {report.resolve()}.")
 
 

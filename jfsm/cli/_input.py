@@ -2,8 +2,9 @@
 
 import functools
 import re
+import shlex
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from inspect import Parameter, signature
 from itertools import pairwise
 from pathlib import Path
@@ -14,7 +15,7 @@ import typer
 if TYPE_CHECKING:
     import jax
 
-    from ..records import Record
+    from ..records import Listing, OutUnits, Record
     from ..structures import Structure
 
 
@@ -37,8 +38,16 @@ Where = Annotated[
     list[str] | None, option("Rows of a long table to take, as run=3; once per column.", "NAME=VALUE", CHANNELS)
 ]
 Rate = Annotated[float | None, option("Samples per second of a file without a clock.", "HZ", CHANNELS)]
+ShownUnits = Annotated[
+    str | None,
+    option("Show results in these units, as in,lbf,deg, or in those of the record (given).", "UNITS|given"),
+]
 ModelFile = Annotated[Path, option("The model that is believed, as TOML.")]
 Seed = Annotated[int | None, option("Seed of the few random draws; without it, another one every time.")]
+
+
+def _dashed(name: str) -> str:
+    return name.replace("_", "-")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,6 +74,10 @@ class _Channels:
     resample: Annotated[
         str | None,
         option("Bring the record to this rate, or to that of its median step (auto).", "HZ|auto", CHANNELS),
+    ] = None
+    every: Annotated[
+        int | None,
+        option("Bring the record to a rate so many times lower, without aliasing.", "NUMBER", CHANNELS),
     ] = None
     at_rest: Annotated[
         bool, typer.Option("--at-rest", help="At rest at the first sample.", rich_help_panel=CHANNELS)
@@ -99,7 +112,31 @@ class _Channels:
             raise ValueError(f"{path}: {error}") from error
         if cut:
             record = record.between(self.since, self.until)
+        if self.every is not None:
+            return record.resample(_slower(self.every, self.resample, record))
         return record if self.resample is None else record.resample(_rate(self.resample, record))
+
+    def listing(self, path: Path) -> "Listing | None":
+        """What a file holds of which nothing was asked for and which does not say itself what is what; else None."""
+        from ..records import listing
+
+        if any((self.force, self.displacement, self.velocity, self.acceleration, self.base_acceleration)):
+            return None
+        found = listing(path, time=self.time, rate=self.rate, run=self.run, sheet=self.sheet)
+        return None if found.told else found
+
+    def given(self) -> list[str]:
+        """The options that were given, as they would be typed."""
+        words = list[str]()
+        for field in fields(_Channels):
+            value, name = getattr(self, field.name), f"--{_dashed(field.name)}"
+            if value is True:
+                words.append(name)
+            elif value not in (None, False):
+                words += [
+                    word for each in (value if isinstance(value, list) else [value]) for word in (name, f"{each}")
+                ]
+        return words
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,6 +144,13 @@ class RecordFile(_Channels):
     """A file, and what its channels are called."""
 
     record: Annotated[Path, _argument("RECORD", f"The record: {_FORMATS}")]
+
+    def proposal(self, command: str, names: Mapping[str, Sequence[str]] | None = None) -> str:
+        """The command line that does something with the record, its channels those of these `names`."""
+        channels = [word for kind, of in (names or {}).items() for name in of for word in (f"--{_dashed(kind)}", name)]
+        words = ["jfsm", command, str(self.record), *channels, *self.given()]
+        model = ["--model", "MODEL.toml"] if command == "diagnose" else []
+        return shlex.join([*words, *model])
 
     def read(self) -> "Record":
         """The record in the file."""
@@ -231,18 +275,32 @@ def in_options(message: str) -> str:
 
 
 _KINDS = "force|displacement|velocity|acceleration"
+_SAME = "time|rate|run|sheet|where|sensitivity|since|until|drive|fixed|holdout|method|order"
 _IN_OPTIONS = (
+    (r"`units` to show results in", "--out-units"),
     (r"\bunits=\{'([^']*)': '([^']*)'\}", r"--unit '\1=\2'"),
     (r"\bunits=\{'([^']*)': \.\.\.\}", r"--unit '\1=UNIT'"),
+    (r"\bunits=\{\.\.\.\}", "--unit NAME=UNIT"),
+    (r"\bunits= ", "--unit "),
     (r"\btime='([^']*)'", r"--time '\1'"),
     (r"\btime=\"\.\.\.\"", "--time NAME"),
     (r"\brate=\.\.\. \[Hz\]", "--rate HZ"),
     (rf'\b({_KINDS})="\.\.\."', r"--\1 NAME"),
+    (r'\bdrive="(force|motion)"', r"--drive \1"),
+    (r"`?\bat_rest=True`?", "--at-rest"),
     (r"\bPass (run|sheet)=(\d+)", r"Pass --\1 \2"),
+    (r"\brecord\.resample\(rate\)", "--resample HZ"),
     (r"\brecord\.resample\(([^)]*)\)", r"--resample \1"),
+    (r"(\b(?:jfsm|record)\.[a-z]+\([^)]*\))(?! in Python)", r"\1 in Python"),
     (r"`units`", "--unit"),
-    (r"`base_acceleration`", "--base-acceleration"),
-    (rf"`({_KINDS}|time|rate|run|sheet|where|sensitivity)`", r"--\1"),
+    (r"`causes`", "--cause"),
+    (r"`(base_acceleration|max_causes|time_limit)`", lambda match: f"--{_dashed(match[1])}"),
+    (rf"`({_KINDS}|{_SAME})`", r"--\1"),
+    (r"^`record`", "RECORD"),
+    (r"`record`", "the record"),
+    (r"`model`", "--model"),
+    (r"--model or `mass`", "--model or --mass"),
+    (r"`at` must name a link", "--at must name a link"),
 )
 
 
@@ -266,6 +324,16 @@ def _rate(text: str, record: "Record") -> float:
         raise ValueError(f"--resample must be a rate in Hz or auto; it was {text!r}.") from None
 
 
+def _slower(every: int, resample: str | None, record: "Record") -> float:
+    """The rate of every so-manieth sample."""
+    if every < 1 or resample is not None:
+        raise ValueError(
+            f"--every must be a whole number from 1 on, and given without --resample; it was {every}"
+            f"{'' if resample is None else f' beside --resample {resample}'}. Give one of them."
+        )
+    return record.sample_rate / every
+
+
 def _where(given: Sequence[str] | None) -> dict[str, str | float] | None:
     """Values by column, from ``run=3`` and ``specimen=B``; what can be a number is one."""
     found: dict[str, str | float] = {}
@@ -280,3 +348,12 @@ def _where(given: Sequence[str] | None) -> dict[str, str | float] | None:
         except ValueError:
             found[name] = value
     return found or None
+
+
+def shown_units(text: str | None, record: "Record | None" = None) -> "OutUnits":
+    """Units to show results in: those that are asked for, or those that the record came in; checked."""
+    from ..records import out_units
+
+    asked = record.written if text == "given" and record is not None else text
+    out_units(asked)
+    return asked

@@ -2,8 +2,14 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 import typer
+
+from ._input import in_options
+
+if TYPE_CHECKING:
+    from ..records import Listing
 
 
 @contextmanager
@@ -43,3 +49,36 @@ def show_table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]
 def say(message: str) -> None:
     """One paragraph on standard error."""
     typer.echo(f"jfsm: {' '.join(message.split())}", err=True)
+
+
+@contextmanager
+def said_in_options() -> Iterator[None]:
+    """What is shown meanwhile names options of the command line, no arguments of Python."""
+    from ..reporting import said_as
+
+    with said_as(in_options):
+        yield
+
+
+def show_listing(found: "Listing", proposal: str) -> None:
+    """The channels of a file of which nothing was asked for, and how to go on."""
+    rows = [
+        (
+            channel.name,
+            channel.unit or "-",
+            channel.kind.replace("_", " ") or "-",
+            f"{channel.samples}",
+            "-" if channel.rate is None else f"{channel.rate:.6g}",
+            "-" if channel.duration is None else f"{channel.duration:.6g}",
+            f"{channel.lowest:.4g}",
+            f"{channel.highest:.4g}",
+        )
+        for channel in found.channels
+    ]
+    headings = ("channel", "unit", "may be", "samples", "rate [Hz]", "seconds", "lowest", "highest")
+    show_table(f"{found.source} does not say which channel is what; it holds", headings, rows)
+    for words in (*found.notes, *filter(None, [found.clock])):
+        typer.echo(f"  {in_options(words)}")
+    typer.echo(f"To go on: {proposal}")
+    if not found.proposed:
+        typer.echo("Add --force NAME, --displacement NAME and the like; channels go by number, too.")

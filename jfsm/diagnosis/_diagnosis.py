@@ -9,6 +9,8 @@ from typing import Any
 import jax
 
 from .._result import Estimate
+from ..identification import Mode
+from ..records import OutUnits, out_units
 from ..structures import Cause, Structure, causes
 from .advice.next_test import Leading, Proposal, proposals
 from .evidence.free_runs import Gain
@@ -133,6 +135,8 @@ class Diagnosis:
     """Makes what is drawn. It takes a map of the missing force, which nothing else needs."""
     decision: Decision
     """How the verdict was reached: every check with what was measured, its limit and its outcome."""
+    modes: tuple[Mode, ...] = ()
+    """Frequency and damping ratio of the modes of the refitted masses, linear springs and dashpots."""
     leading: Leading | None = None
     """The two most probable explanations, where there are two; None otherwise."""
     finished: bool = True
@@ -188,26 +192,29 @@ class Diagnosis:
                 return Explanation(f"{cause} was not looked for.\n")
             raise ValueError(f"`cause` must be the id of a cause; got {cause!r}. {error}") from None
 
-    def print(self) -> None:
-        """Verdict, findings and gain on the terminal."""
-        from ..reporting import print_diagnosis
+    def print(self, units: OutUnits = None) -> None:
+        """Verdict, findings and gain on the terminal, in other units if they are given, as ``"in,lbf,deg"``."""
+        from ..reporting import print_diagnosis, shown_in
 
-        print_diagnosis(self.data)
+        with shown_in(out_units(units)):
+            print_diagnosis(self.data)
 
-    def plot(self) -> Any:
-        """The pictures of the report as one matplotlib figure."""
-        from ..reporting import plot_diagnosis
+    def plot(self, units: OutUnits = None) -> Any:
+        """The pictures of the report as one matplotlib figure; `units` as of `print`."""
+        from ..reporting import plot_diagnosis, shown_in
 
-        return plot_diagnosis(self.data)
+        with shown_in(out_units(units)):
+            return plot_diagnosis(self.data)
 
-    def report(self, path: str | Path) -> None:
-        """Write a self-contained HTML page; the file appears whole or not at all."""
-        from ..reporting import render_page, write_text_atomically
+    def report(self, path: str | Path, units: OutUnits = None) -> None:
+        """Write a self-contained HTML page; the file appears whole or not at all. `units` as of `print`."""
+        from ..reporting import render_page, shown_in, write_text_atomically
 
-        write_text_atomically(Path(path), render_page(self.data))
+        with shown_in(out_units(units)):
+            write_text_atomically(Path(path), render_page(self.data))
 
     def to_json(self, path: str | Path) -> None:
-        """Write every number of the verdict as JSON."""
+        """Write every number of the verdict as JSON, in the record's units, which stand beside each."""
         import json
 
         from ..reporting import write_text_atomically

@@ -118,6 +118,40 @@ class Response:
     force: Float[HostArray, "n dof"] | None = None
     error: Float[HostArray, " dof"] | None = None
     agreed_until: float | None = None
+    _record: Record | None = None
+    _given: Any = None
+
+    def to_record(self) -> Record:
+        """The run as a record, as if everything had been measured: its motion and what drove it, in its units.
+
+        Where the motion was imposed, the force that it needs. A run that diverged ends before its escape.
+
+        Raises
+        ------
+        ValueError
+            If the response was not made by `simulate`, or ended before its second sample.
+        """
+        if self._record is None:
+            raise ValueError(
+                "`response` must come from jfsm.simulate to be a record; this one was made by hand. Make the record "
+                "from its arrays: jfsm.Record(time, displacement=...)."
+            )
+        of, n = self._record, len(self.time)
+        force = {j: samples[:n] for (kind, j), samples in of.channels.items() if kind == "force"} or None
+        base = of.base_acceleration
+        record = Record(
+            self.time,
+            force=self.force if self.force is not None else force if self._given is None else self._given[:n],
+            displacement=self.displacement,
+            velocity=self.velocity,
+            acceleration=self.acceleration,
+            base_acceleration=None if base is None else base[:n],
+            units=of.units,
+            at_rest=of.at_rest,
+            drive=of.drive,
+            name=f"{of.name}, simulated" if of.name else "simulated",
+        )
+        return record.noted("Simulated by jfsm.")
 
     @property
     def accuracy(self) -> str:
@@ -234,7 +268,7 @@ def simulate(
     samples = _force_samples(model, record, force)
     start = starting_state(model, record, initial_state, window=window, reconstruction=reconstruction)
     run = _free_run(model, record, samples, start, reconstruction, solver, tolerance)
-    return _response(model, record, run)
+    return _response(model, record, run, None if force is None else samples)
 
 
 def _traced_response(model: Structure, record: Record, initial_state: Any, force: Any, reconstruction) -> Response:
@@ -351,8 +385,8 @@ def _controlled_run(
     return found
 
 
-def _response(model: Structure, record: Record, run: _Run) -> Response:
-    """What a run shows: in the record's datum, up to its escape."""
+def _response(model: Structure, record: Record, run: _Run, given: np.ndarray | None = None) -> Response:
+    """What a run shows: in the record's datum, up to its escape; `given` is the force in place of the record's."""
     n = len(record) if run.stop is None else run.stop
     x, v, a = run.motion
     if record.base_acceleration is not None:
@@ -371,6 +405,8 @@ def _response(model: Structure, record: Record, run: _Run) -> Response:
         _sensors=model.sensors,
         error=run.agreement.error,
         agreed_until=None if parted is None else float(record.time[max(parted - 1, 0)]),
+        _record=record,
+        _given=given,
         **shown,
     )
 
@@ -446,7 +482,7 @@ def _imposed_response(model: Structure, record: Record) -> Response:
     force = force_needed(plant, observation_of(channels, model.dof), path.imposed(substeps, bucket(len(record))))
     return Response(
         record.time, *path.motion(record.time), Result.successful, None, "grid", model.sensors,
-        np.asarray(force)[: len(record)],
+        np.asarray(force)[: len(record)], _record=record,
     )  # fmt: skip
 
 

@@ -11,6 +11,10 @@ from ._maximise import finish as finish
 from ._maximise import maximise as maximise
 from ._maximise import rungs as rungs
 from ._maximise import settle as settle
+from ._modes import Mode as Mode
+from ._modes import modes_of as modes_of
+from ._modes import oscillations as oscillations
+from ._modes import ratios as ratios
 from ._nuisances import LEAST_SAMPLES as LEAST_SAMPLES
 from ._nuisances import Nuisances as Nuisances
 from ._nuisances import prepare as prepare

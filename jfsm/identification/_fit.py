@@ -16,6 +16,7 @@ from ..records import Record, mended
 from ..structures import Offset, Structure, is_offset
 from ._maximise import Maximum, approach, finish
 from ._missing_links import missing_links, words_of
+from ._modes import Mode, modes_of
 from ._nuisances import Nuisances, prepare_all
 from ._posterior import Hypothesis, Posterior, lanes_of
 from ._starts import natural_starts, starts
@@ -59,6 +60,9 @@ class Fit:
     missing : str
         Springs that the structure does not have, and that would make the records more probable, in words; empty where
         there are none.
+    modes : tuple of Mode
+        Frequency [Hz] and damping ratio, with 95 % intervals, of every mode of the masses, linear springs and dashpots
+        that oscillates and is well defined, ascending.
     """
 
     structure: Structure
@@ -70,6 +74,7 @@ class Fit:
     noise: dict[str, float]
     result: Result
     missing: str = ""
+    modes: tuple[Mode, ...] = ()
 
 
 @programs_kept()
@@ -142,7 +147,9 @@ def fit(
     }
     words = _words(unknowns[: len(free)], theta, error, pairs, structure)
     missing = words_of(missing_links(posterior, theta, lane)[:_SAID])
-    return Fit(kept, values, intervals, pairs, words, -float(best.value[lane]), noise, best.results[lane], missing)
+    modes = modes_of(structure, unknowns, theta, covariance)
+    value, result = -float(best.value[lane]), best.results[lane]
+    return Fit(kept, values, intervals, pairs, words, value, noise, result, missing, modes)
 
 
 def sandwich(

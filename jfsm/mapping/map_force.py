@@ -12,7 +12,7 @@ from .._programs import programs_kept
 from .._result import Estimate
 from .._types import evenly_taken
 from ..estimation import RestoringForce, restoring_force
-from ..records import Record
+from ..records import OutUnits, Record, out_units
 from ..structures import Parameter, Structure
 from ..surrogates import RKPM, Discontinuity, Kriging, find_discontinuities
 from .learned_map import LearnedMap, check_method, learn
@@ -79,17 +79,19 @@ class MappedForce:
     def __repr__(self) -> str:
         return f"<MappedForce at {self.at}, {type(self.force_map).__name__}, error {self.error:.3g}>"
 
-    def print(self) -> None:
-        """The map in figures, on the terminal."""
-        from ..reporting import print_force_map
+    def print(self, units: OutUnits = None) -> None:
+        """The map in figures, on the terminal, in other units if they are given, as ``"in,lbf,deg"``."""
+        from ..reporting import print_force_map, shown_in
 
-        print_force_map(self.data)
+        with shown_in(out_units(units)):
+            print_force_map(self.data)
 
-    def report(self, path: str | Path) -> None:
-        """Write a self-contained HTML page; the file appears whole or not at all."""
-        from ..reporting import render_force_map, write_text_atomically
+    def report(self, path: str | Path, units: OutUnits = None) -> None:
+        """Write a self-contained HTML page; the file appears whole or not at all. `units` as of `print`."""
+        from ..reporting import render_force_map, shown_in, write_text_atomically
 
-        write_text_atomically(path, render_force_map(self.data))
+        with shown_in(out_units(units)):
+            write_text_atomically(path, render_force_map(self.data))
 
 
 @programs_kept()

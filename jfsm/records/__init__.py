@@ -9,6 +9,8 @@ from jfsm.records._defects import bridged as bridged
 from jfsm.records._defects import clipped as clipped
 from jfsm.records._defects import defects as defects
 from jfsm.records._defects import spikes as spikes
+from jfsm.records._listing import Listing as Listing
+from jfsm.records._listing import listing as listing
 from jfsm.records._look import LOOKS as LOOKS
 from jfsm.records._look import Look as Look
 from jfsm.records._look import is_constant as is_constant
@@ -16,6 +18,8 @@ from jfsm.records._look import look as look
 from jfsm.records._mended import mended as mended
 from jfsm.records._noise_floor import NoiseFloor as NoiseFloor
 from jfsm.records._noise_floor import noise_floor as noise_floor
+from jfsm.records._out_units import OutUnits as OutUnits
+from jfsm.records._out_units import out_units as out_units
 from jfsm.records._quantisation import quantisation_step as quantisation_step
 from jfsm.records._read import read as read
 from jfsm.records._record import Record as Record

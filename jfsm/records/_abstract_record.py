@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from jfsm.records._advance import advanced
 from jfsm.records._channels import Columns, as_columns, as_single, as_time, frozen
-from jfsm.records._resample import resampled
+from jfsm.records._resample import long_gaps, resampled
 from jfsm.records._units import KINDS, coherent_units, find_unit
 
 Channel = NDArray[np.float64]
@@ -52,7 +52,7 @@ class AbstractRecord:
         self._time = as_time(time, factors.pop("time", 1.0))
         stated.pop("time", None)
         self._units = dict(coherent_units(stated))
-        self._stated = frozenset(stated)
+        self._written = {kind: str((units or {})[kind]) for kind in stated}
         given = {"force": force, "displacement": displacement, "velocity": velocity, "acceleration": acceleration}
         self._columns: dict[str, Columns] = {
             kind: as_columns(kind, samples, self._time, factors.get(kind, 1.0))
@@ -66,6 +66,7 @@ class AbstractRecord:
         self._at_rest = bool(at_rest)
         self._drive: Drive = drive
         self._name = name
+        self._begins: np.datetime64 | None = None
         self._notes: tuple[str, ...] = ()
         self._lost: dict[tuple[str, int], Lost] = {}
 
@@ -130,7 +131,12 @@ class AbstractRecord:
     @property
     def stated(self) -> frozenset[str]:
         """Kinds of channel whose unit was stated; that of the others was assumed."""
-        return self._stated
+        return frozenset(self._written)
+
+    @property
+    def written(self) -> Mapping[str, str]:
+        """The unit in which the numbers of each kind of channel came, where one was stated: what `units` says is SI."""
+        return MappingProxyType(self._written)
 
     @property
     def dofs(self) -> int:
@@ -173,6 +179,11 @@ class AbstractRecord:
         Those that a mended record bridges; `inspect` names what else may be none.
         """
         return MappingProxyType(self._lost)
+
+    @property
+    def begins(self) -> np.datetime64 | None:
+        """When the clock reads zero, in UTC or in local time as its recorder has it; None if unknown."""
+        return self._begins
 
     @property
     def dt(self) -> float:
@@ -289,6 +300,24 @@ class AbstractRecord:
         other = self._with(frozen(self._time + seconds), self._columns, self._base_acceleration, at_rest=self._at_rest)
         return other.noted(f"The clock was put {'forward' if seconds >= 0 else 'back'} by {abs(seconds):.9g} s.")
 
+    def dated(self, begins: np.datetime64 | str | None) -> Self:
+        """The same record, whose clock reads zero at this date, ``"2024-03-05T14:30:00.005"``, or at no known one.
+
+        `jfsm.align` and `jfsm.join` put clocks together by these instants where all records have one.
+
+        Raises
+        ------
+        ValueError
+            If `begins` is no date.
+        """
+        try:
+            instant = None if begins is None else np.datetime64(str(begins), "ns")
+        except ValueError as error:
+            raise ValueError(f"`begins` must be a date, as 2024-03-05T14:30:00; it was {begins!r}.") from error
+        other = self._with(self._time, self._columns, self._base_acceleration, at_rest=self._at_rest)
+        other._begins = instant
+        return other
+
     def aligned(self, late: Mapping[tuple[str, int], float]) -> Self:
         """The record with channels put right that are late by a known time, with a note.
 
@@ -323,7 +352,8 @@ class AbstractRecord:
         """The record on a uniform clock of `rate` samples per second [Hz], without aliasing.
 
         The clock begins at the first instant. Uneven samples are first interpolated by a cubic spline; then every
-        channel passes the same linear-phase filter, so their timing relative to each other is kept.
+        channel passes the same linear-phase filter, so their timing relative to each other is kept. Within gaps of more
+        than two samples nothing is known: samples there are in `lost` and take no part in a fit.
 
         Raises
         ------
@@ -395,8 +425,27 @@ class AbstractRecord:
         other = self.noted(*self.notes)._with(frozen(time), columns, base, at_rest=self._at_rest)
         nearest = np.clip(np.searchsorted(self._time, time), 0, len(self) - 1)
         beside = np.maximum(nearest - 1, 0)
-        other._lost = _where_any({key: lost[nearest] | lost[beside] for key, lost in self._lost.items()})
-        return other, note
+        unknown, words = self._unknown(time)
+        nothing = np.zeros(len(self), dtype=bool)
+        lost = {key: self._lost.get(key, nothing) for key in self.channels}
+        other._lost = _where_any({key: frozen(mask[nearest] | mask[beside] | unknown) for key, mask in lost.items()})
+        return other, note + words
+
+    def _unknown(self, time: Channel) -> tuple[Lost, str]:
+        """Which instants of another clock lie in long gaps of this one, and what to say of them."""
+        gaps = long_gaps(self._time) if self._jitter > UNEVEN else []
+        unknown = np.zeros(time.size, dtype=bool)
+        for before, after in gaps:
+            unknown |= (time > before) & (time < after)
+        if not np.any(unknown):
+            return unknown, ""
+        several, total = "s" if len(gaps) > 1 else "", sum(after - before for before, after in gaps)
+        forces = " The force is not known there either." if "force" in self._columns else ""
+        return unknown, (
+            f" Within {len(gaps)} gap{several} of more than two samples, {total:.6g} s in all, the first from "
+            f"t = {gaps[0][0]:.6g} s on, {int(unknown.sum())} samples are not known; they take no part in a "
+            f"fit.{forces}"
+        )
 
     def _with(self, time: Channel, columns: dict[str, Columns], base: Channel | None, at_rest: bool) -> Self:
         """The same test with other samples, which are trusted."""

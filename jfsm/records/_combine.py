@@ -21,7 +21,8 @@ def join(records: Sequence[Record]) -> Record:
     ----------
     records : sequence of Record
         Pieces with the same channels, units and rate, each beginning one step after the last instant of the one before.
-        Where the clock of a piece begins anew, say first when: ``piece.shifted(seconds)``.
+        Clocks are put together by their dates where all have one (`Record.begins`); where that of a piece begins anew
+        otherwise, say first when: ``piece.shifted(seconds)``.
 
     Returns
     -------
@@ -34,7 +35,7 @@ def join(records: Sequence[Record]) -> Record:
         If they are no records, none, overlap, leave a gap, or differ in channels, units, rate or drive. Separate runs
         need not be joined: `fit` and `diagnose` take a list of records.
     """
-    pieces = _several(records)
+    pieces, dated = _on_one_clock(_several(records))
     for number, (before, after) in enumerate(pairwise(pieces), start=1):
         _require_alike(number, before, after)
         _require_consecutive(number, before, after)
@@ -48,7 +49,7 @@ def join(records: Sequence[Record]) -> Record:
     joined = first._with(time, columns, frozen(np.concatenate(bases)) if bases else None, first.at_rest)
     told = (f"{_called(piece, i)} to t = {piece.time[-1]:.6g} s" for i, piece in enumerate(pieces, start=1))
     notes = [note for piece in pieces for note in piece._notes]
-    return joined.noted(*notes, f"Joined from {len(pieces)} pieces: {', '.join(told)}.")
+    return joined.noted(*notes, *dated, f"Joined from {len(pieces)} pieces: {', '.join(told)}.")
 
 
 def align(records: Sequence[Record], rate: float | None = None) -> Record:
@@ -57,8 +58,9 @@ def align(records: Sequence[Record], rate: float | None = None) -> Record:
     Parameters
     ----------
     records : sequence of Record
-        Different channels of one run, each record on its own clock and at its own rate. The clocks must read the same
-        at the same instant; where one is known to be off, put it right first: ``record.shifted(seconds)``.
+        Different channels of one run, each record on its own clock and at its own rate. Where all say at which date
+        their clocks read zero (`Record.begins`), they are put on that of the first; else the clocks must read the same
+        at the same instant. Where one is known to be off, put it right first: ``record.shifted(seconds)``.
     rate : float, optional
         Samples per second [Hz] of the common clock; by default that of the first record.
 
@@ -76,16 +78,17 @@ def align(records: Sequence[Record], rate: float | None = None) -> Record:
         If they are no records, none, share no time, measure one channel twice, have one kind in different units or
         differ in drive, or if `rate` is not positive.
     """
-    parts = _several(records)
+    parts, dated = _on_one_clock(_several(records))
     for number, part in enumerate(parts[1:], start=2):
         if part.drive != parts[0].drive:
             raise ValueError(_differs(number, "drive", part.drive, parts[0].drive))
     start, end = max(part.time[0] for part in parts), min(part.time[-1] for part in parts)
     if start >= end:
         told = ", ".join(f"{_called(part, i)} {_extent(part)}" for i, part in enumerate(parts, start=1))
+        as_read = ", or take them as they read by record.dated(None)" if dated else ""
         raise ValueError(
-            f"`records` must share a stretch of time; they are {told}. Put their clocks right by "
-            f"record.shifted(seconds); pieces that follow one another are put together by jfsm.join."
+            f"`records` must share a stretch of time; they are {told}. {' '.join([*dated, ''])}Put their clocks right "
+            f"by record.shifted(seconds){as_read}; pieces that follow one another are put together by jfsm.join."
         )
     common = parts[0].sample_rate if rate is None else rate
     channels: dict[str, dict[int, NDArray[np.float64]]] = {}
@@ -113,7 +116,31 @@ def align(records: Sequence[Record], rate: float | None = None) -> Record:
     last = max(parts, key=lambda part: part.time[0])
     merged = Record(time, **arguments, units=units, at_rest=last.at_rest, drive=parts[0].drive, name=parts[0].name)
     extent = f"{len(parts)} records are aligned over the time they share, t = {time[0]:.6g} to {time[-1]:.6g} s."
-    return merged.noted(*notes, *told, extent)
+    return merged.dated(parts[0].begins).noted(*notes, *dated, *told, extent)
+
+
+def _on_one_clock(records: list[Record]) -> tuple[list[Record], list[str]]:
+    """The records on the clock of the first, if all say when theirs read zero, and what was done or could not be."""
+    first, notes, result = records[0].begins, list[str](), records[:1]
+    dates = [record.begins for record in records]
+    if first is None or None in dates:
+        known = [_called(record, i) for i, record in enumerate(records, start=1) if record.begins is not None]
+        if known and len(records) > 1:
+            notes.append(f"Only {', '.join(known)} says when its clock read zero; all clocks are taken as they read.")
+        return records, notes
+    for number, record in enumerate(records[1:], start=2):
+        later = float((record.begins - first) / np.timedelta64(1, "ns")) * 1e-9  # pyright: ignore[reportOptionalOperand]
+        if later == 0:
+            result.append(record)
+            continue
+        moved = frozen(record.time + later)
+        result.append(record._with(moved, record._columns, record._base_acceleration, record.at_rest).dated(first))
+        when, way = ("after", "forward") if later > 0 else ("before", "back")
+        notes.append(
+            f"The clock of {_called(record, number)} reads zero {abs(later):.9g} s {when} that of "
+            f"{_called(records[0], 1)}, by the dates of both; it is put {way}."
+        )
+    return result, notes
 
 
 def _several(records: Any) -> list[Record]:

@@ -2,8 +2,9 @@
 
 import contextlib
 import re
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from jfsm.records._abstract_record import AbstractRecord, AnyRecord, Drive
 from jfsm.records._repeats import repetition
 from jfsm.records._units import KINDS, find_sensitivity, find_unit
 from jfsm.records.formats.base import Contents, point_name
-from jfsm.records.formats.clocks import clock_of
+from jfsm.records.formats.clocks import Clock, clock_of
 from jfsm.records.formats.lookup import (
     ChannelName,
     Choice,
@@ -41,93 +42,147 @@ def contents_of(record: AbstractRecord) -> Contents:
         "name": record.name,
         "notes": list(record._notes),
     }
+    if record.begins is not None:
+        about["begins"] = str(record.begins)
     return Contents(arrays, units, about)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What a caller says of the channels of a file: arguments of `read`, under their names there.
+
+    `wanted` holds the names of each kind of channel, in their order.
+    """
+
+    wanted: Sequence[ChannelName]
+    units: Mapping[str, str] | None = None
+    sensitivity: Mapping[str, str] | None = None
+    time: str | None = None
+    rate: float | None = None
+    run: Run = None
+    at_rest: bool | None = None
+    drive: Drive | None = None
+    name: str | None = None
+
+
 def record_of(
-    make: type[AnyRecord],
-    contents: Contents,
-    source: str,
-    wanted: Sequence[ChannelName],
-    *,
-    units: Mapping[str, str],
-    sensitivity: Mapping[str, str],
-    time: str | None = None,
-    rate: float | None = None,
-    run: Run = None,
-    at_rest: bool | None = None,
-    drive: Drive | None = None,
-    name: str | None = None,
-    default_name: str | None = None,
+    make: type[AnyRecord], contents: Contents, source: str, asked: Asked, default_name: str | None = None
 ) -> AnyRecord:
     """A `make`, the class of the record, from contents that messages call `source`.
 
-    `wanted` holds the names of each kind of channel, in their order. Other arguments and errors are those of `read`.
+    Errors are those of `read`.
     """
-    named = {kind: names for kind, names in zip(KINDS, wanted, strict=True) if names is not None}
-    chosen = {
-        kind: _by_dof(contents, source, kind, names) for kind, names in (named or own_names(contents, source)).items()
-    }
+    chosen = {kind: _by_dof(contents, source, kind, names) for kind, names in _names(contents, source, asked).items()}
     every = [choice for choices in chosen.values() for choice in choices.values()]
-    clock = clock_of(contents, source, every, time, rate, units)
-    used = [*every, *clock.columns]
-    _require_read("units", units, used)
+    units, sensitivity = asked.units or {}, asked.sensitivity or {}
+    clock = clock_of(contents, source, every, asked.time, asked.rate, units)
+    _require_read("units", units, [*every, *clock.columns])
     _require_read("sensitivity", sensitivity, every)
-    stated = {choice: _unit(contents, source, choice, units) for choice in every}
-    named_so = {choice: unit for choice in every if stated[choice] is None and (unit := _unit_in_name(choice))}
-    stated |= named_so
-    assumed = [choice for choice in every if stated[choice] is None and _said(sensitivity, choice) is None]
-    factors: dict[Choice, float] = {}
-    for choice in every:
-        given = _said(sensitivity, choice)
-        if given is not None:
-            sensor = find_sensitivity(given, choice.name, choice.kind)
-            written = find_unit(stated[choice] or sensor.reading, choice.kind)
-            factors[choice] = written.factor / (sensor.size * find_unit(sensor.reading, choice.kind).factor)
-            _require_raw(choice, stated[choice], written.coherent, find_unit(sensor.reading, choice.kind).coherent)
-            stated[choice] = sensor.unit
-    channels: dict[str, Any] = {}
-    for kind, choices in chosen.items():
-        arrays = {dof: clock.of_samples(samples_of(contents, source, choice)) for dof, choice in choices.items()}
-        for dof in arrays:
-            if choices[dof] in factors:
-                arrays[dof] = arrays[dof] * factors[choices[dof]]
-        channels[kind] = arrays if None not in arrays else arrays[None]
-    begun = beginnings(clock.seconds)
-    part = (
-        run_of_clock(source, clock.seconds, begun.tolist(), run) if begun.size > 1 or run is not None else slice(None)
-    )
+    scales = {choice: _scale(contents, source, choice, units, sensitivity) for choice in every}
+    part, told = _part(source, clock, asked.run)
     record = make(
         clock.seconds[part],
-        **{kind: _rows(samples, part, clock.seconds.size) for kind, samples in channels.items()},
-        units=_one_for_each_kind(source, stated),
-        at_rest=contents.about.get("at_rest", False) if at_rest is None else at_rest,
-        drive=drive or contents.about.get("drive", "force"),
-        name=contents.about.get("name", default_name) if name is None else name,
+        **{kind: _samples(contents, source, choices, clock, scales, part) for kind, choices in chosen.items()},
+        units=_one_for_each_kind(source, {choice: scale.unit for choice, scale in scales.items()}),
+        **_of_the_whole(contents, asked, default_name),
     )
-    notes = [*contents.about.get("notes", ()), *contents.notes, *clock.notes]
-    if clock.begins is not None:
-        notes.append(f"The clock reads zero at {str(clock.begins).replace('T', ' ')}.")
-    if part != slice(None):
-        notes.append(f"Run {begun.tolist().index(part.start) + 1} of {begun.size} that follow one another in {source}.")
-    for choice, unit in named_so.items():
-        notes.append(f"{choice.array!r} is taken to be in {unit}, by its name; units= says otherwise.")
-    if assumed and not contents.about:
-        notes.append(_assumed(assumed, record.units))
+    notes = [*contents.about.get("notes", ()), *contents.notes, *clock.notes, *_of_the_start(clock), *told]
+    notes += _of_units(scales, record.units, said=not contents.about)
     notes += _held(source, {choice.name: samples_of(contents, source, choice) for choice in every})
-    if not named and contents.points and not contents.about:
-        numbered = (f"{dof} is {point_name(*point)}" for point, dof in dofs_of_points(contents).items())
-        notes.append(f"Degrees of freedom by node and direction: {', '.join(numbered)}.")
-    return record.noted(*notes)
+    if contents.points and not contents.about and not any(asked.wanted):
+        notes.append(_of_the_points(contents))
+    begins = contents.about.get("begins") if clock.begins is None else str(clock.begins)
+    return record.dated(begins).noted(*notes)
 
 
-def _rows(samples: Any, part: slice, size: int) -> Any:
-    """The samples of one run."""
+def _names(contents: Contents, source: str, asked: Asked) -> Mapping[str, ChannelName]:
+    """Names of channels by kind: those that are asked for, else those that the file says the kind of."""
+    named = {kind: names for kind, names in zip(KINDS, asked.wanted, strict=True) if names is not None}
+    return named or own_names(contents, source)
+
+
+def _of_the_whole(contents: Contents, asked: Asked, default_name: str | None) -> dict[str, Any]:
+    """What is to be known of the record as a whole: as the caller says, else as the file does."""
+    about = contents.about
+    return {
+        "at_rest": about.get("at_rest", False) if asked.at_rest is None else asked.at_rest,
+        "drive": asked.drive or about.get("drive", "force"),
+        "name": about.get("name", default_name) if asked.name is None else asked.name,
+    }
+
+
+def _of_the_start(clock: Clock) -> Iterator[str]:
+    if clock.begins is not None:
+        yield f"The clock reads zero at {str(clock.begins).replace('T', ' ')}."
+
+
+def _of_the_points(contents: Contents) -> str:
+    numbered = (f"{dof} is {point_name(*point)}" for point, dof in dofs_of_points(contents).items())
+    return f"Degrees of freedom by node and direction: {', '.join(numbered)}."
+
+
+class _Scale(NamedTuple):
+    """The unit of a channel, None if nothing says it, and what its numbers are to be multiplied by before."""
+
+    unit: str | None
+    factor: float | None = None
+    from_name: bool = False
+
+
+def _scale(
+    contents: Contents, source: str, choice: Choice, units: Mapping[str, str], sensitivity: Mapping[str, str]
+) -> _Scale:
+    """What the caller, the file and the name say of the unit of a channel, in this order."""
+    stated, from_name = _unit(contents, source, choice, units), False
+    if stated is None:
+        stated = _unit_in_name(choice)
+        from_name = stated is not None
+    given = _said(sensitivity, choice)
+    if given is None:
+        return _Scale(stated, None, from_name)
+    sensor = find_sensitivity(given, choice.name, choice.kind)
+    written, reading = find_unit(stated or sensor.reading, choice.kind), find_unit(sensor.reading, choice.kind)
+    _require_raw(choice, stated, written.coherent, reading.coherent)
+    return _Scale(sensor.unit, written.factor / (sensor.size * reading.factor), from_name)
+
+
+def _of_units(scales: Mapping[Choice, _Scale], units: Mapping[str, str], said: bool) -> Iterator[str]:
+    """What units were taken from names, and, unless the file tells of itself, from nowhere."""
+    for choice, scale in scales.items():
+        if scale.from_name:
+            yield f"{choice.array!r} is taken to be in {scale.unit}, by its name; units= says otherwise."
+    assumed = [choice for choice, scale in scales.items() if scale.unit is None]
+    if assumed and said:
+        yield _assumed(assumed, units)
+
+
+def _part(source: str, clock: Clock, run: Run) -> tuple[slice, list[str]]:
+    """The samples of the run that is asked for, and what to say of it."""
+    begun = beginnings(clock.seconds)
+    if begun.size == 1 and run is None:
+        return slice(None), []
+    part = run_of_clock(source, clock.seconds, begun.tolist(), run)
     if part == slice(None):
-        return samples
-    if isinstance(samples, dict):
-        return {dof: _rows(column, part, size) for dof, column in samples.items()}
-    return samples[part] if np.shape(samples)[:1] == (size,) else samples
+        return part, []
+    number = begun.tolist().index(part.start) + 1
+    return part, [f"Run {number} of {begun.size} that follow one another in {source}."]
+
+
+def _samples(
+    contents: Contents,
+    source: str,
+    choices: Mapping[int | None, Choice],
+    clock: Clock,
+    scales: Mapping[Choice, _Scale],
+    part: slice,
+) -> Any:
+    """The channels of one kind by dof, or all of them in one array, over one run."""
+    arrays: dict[int | None, Any] = {}
+    for dof, choice in choices.items():
+        samples, factor = clock.of_samples(samples_of(contents, source, choice)), scales[choice].factor
+        samples = samples if factor is None else samples * factor
+        arrays[dof] = samples[part] if np.shape(samples)[:1] == clock.seconds.shape else samples
+    return arrays[None] if None in arrays else arrays
 
 
 def _assumed(choices: Sequence[Choice], units: Mapping[str, str]) -> str:

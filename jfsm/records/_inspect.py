@@ -20,6 +20,7 @@ from jfsm.records._look import look
 from jfsm.records._mended import mended
 from jfsm.records._noise_floor import SHORTEST, noise_floor
 from jfsm.records._noise_spectrum import NoiseSpectrum, noise_spectrum
+from jfsm.records._out_units import OutUnits, out_units
 from jfsm.records._periods import Periods, average
 from jfsm.records._plain import plain
 from jfsm.records._polarity import is_inverted
@@ -103,26 +104,28 @@ class Inspection:
         """Plain numbers, text, lists and dictionaries, as JSON has them; the samples themselves are left out."""
         return {field: plain(value) for field, value in vars(self).items() if field not in ("time", "traces")}
 
-    def print(self) -> None:
-        """Show channels and findings in the terminal."""
-        from jfsm.reporting import print_inspection
+    def print(self, units: OutUnits = None) -> None:
+        """Show channels and findings in the terminal, in other units if they are given, as ``"in,lbf,deg"``."""
+        from jfsm.reporting import print_inspection, shown_in
 
-        print_inspection(self.to_dict())
+        with shown_in(out_units(units)):
+            print_inspection(self.to_dict())
 
-    def report(self, path: str | Path) -> None:
+    def report(self, path: str | Path, units: OutUnits = None) -> None:
         """Write a self-contained HTML page: findings, channels over time, noise, spectra and what else there is to see.
 
-        The file appears under its name only when it is complete.
+        The file appears under its name only when it is complete. `units` as of `print`.
 
         Raises
         ------
         OSError
             If `path` is not a file in a folder that can be written to; what stood there is still there.
         """
-        from jfsm.reporting import render_inspection, write_text_atomically
+        from jfsm.reporting import render_inspection, shown_in, write_text_atomically
 
         curves = {"time": self.time, "channels": {trace.channel: vars(trace) for trace in self.traces}}
-        write_text_atomically(path, render_inspection({**self.to_dict(), "curves": curves}))
+        with shown_in(out_units(units)):
+            write_text_atomically(path, render_inspection({**self.to_dict(), "curves": curves}))
 
 
 def inspect(record: AbstractRecord) -> Inspection:

@@ -1,19 +1,17 @@
-"""A record from a file."""
+"""A record from a file, or from a table in memory."""
 
 from collections.abc import Mapping
-from pathlib import Path
+from typing import Any
 
 from jfsm.records._abstract_record import Drive
-from jfsm.records._contents import record_of
+from jfsm.records._contents import Asked
 from jfsm.records._record import Record
-from jfsm.records.formats import format_of
+from jfsm.records._sources import record_from
 from jfsm.records.formats.lookup import ChannelName
-from jfsm.records.formats.rows import rows_where
-from jfsm.records.formats.runs import chosen_run
 
 
 def read(
-    path: str | Path,
+    source: Any,
     *,
     time: str | None = None,
     force: ChannelName = None,
@@ -31,14 +29,17 @@ def read(
     drive: Drive | None = None,
     name: str | None = None,
 ) -> Record:
-    """The record in a file.
+    """The record in a file, or in a table in memory.
 
     Parameters
     ----------
-    path : str or Path
+    source : str, Path, DataFrame, Dataset or sequence of dict
         A file, told by what it holds, whatever its ending: text, LabVIEW, WAV, NumPy, JSON, MATLAB, HDF5, UFF,
-        strong-motion and OpenSim text; with extras (``jfsm[excel]``, ``[tdms]``, ``[mf4]``, ``[parquet]``,
-        ``[ros]``) spreadsheets, TDMS, MDF, Parquet and ROS bags. docs/files.md says what is read of each.
+        strong-motion and OpenSim text, motion capture; with extras (``jfsm[excel]``, ``[tdms]``, ``[mf4]``,
+        ``[parquet]``, ``[ros]``, ``[px4]``) spreadsheets, TDMS, MDF, Parquet, ROS bags and logs of PX4. docs/files.md
+        says what is read of each. In memory: a DataFrame or Series of pandas, a DataFrame of polars, a Table of
+        pyarrow, a Dataset or DataArray of xarray, channels after SEP 5. An index, or a coordinate, that holds instants
+        is the clock.
     time : str, optional
         Name of the column of instants; otherwise the clock that the channels have in the file, then a column called
         time, t, Zeit, Timestamp and the like, then a single number ``fs`` [Hz] or ``dt`` [s]: beside the channels
@@ -76,6 +77,8 @@ def read(
     ------
     FileNotFoundError
         If there is no such file.
+    TypeError
+        If `source` is none of these.
     ModuleNotFoundError
         If its format needs an extra that is not installed.
     ValueError
@@ -92,21 +95,15 @@ def read(
 
     For anything more involved load the arrays and call `Record` with them.
     """
-    path = Path(path)
-    file_format = format_of(path)
-    contents, run = chosen_run(file_format.load(path), path.name, run, sheet)
-    return record_of(
-        Record,
-        rows_where(contents, path.name, where) if where else contents,
-        path.name,
-        (force, displacement, velocity, acceleration, base_acceleration),
+    asked = Asked(
+        wanted=(force, displacement, velocity, acceleration, base_acceleration),
+        units=units,
+        sensitivity=sensitivity,
         time=time,
-        units=units or {},
-        sensitivity=sensitivity or {},
         rate=rate,
         run=run,
         at_rest=at_rest,
         drive=drive,
         name=name,
-        default_name=path.stem,
     )
+    return record_from(Record, source, asked, where, sheet)

@@ -5,11 +5,13 @@ from pathlib import Path
 from typing import Any, Self
 
 from jfsm.records._abstract_record import AbstractRecord, Drive
-from jfsm.records._contents import contents_of, record_of
+from jfsm.records._contents import Asked, contents_of, record_of
 from jfsm.records._fold import fold
 from jfsm.records._inspect import Inspection, inspect
 from jfsm.records._write import write
+from jfsm.records.formats.frames import contents_of_frame, frame_of
 from jfsm.records.formats.lookup import ChannelName
+from jfsm.records.formats.rows import rows_where
 from jfsm.records.formats.sep005 import channels_of, contents_of_channels
 
 
@@ -114,17 +116,15 @@ class Record(AbstractRecord):
         ValueError
             If a channel lacks a key, two have one name, clocks differ, or a name is not among them.
         """
-        return record_of(
-            cls,
-            contents_of_channels(channels),
-            "`channels`",
-            (force, displacement, velocity, acceleration, base_acceleration),
-            units=units or {},
-            sensitivity=sensitivity or {},
+        asked = Asked(
+            wanted=(force, displacement, velocity, acceleration, base_acceleration),
+            units=units,
+            sensitivity=sensitivity,
             at_rest=at_rest,
             drive=drive,
             name=name,
         )
+        return record_of(cls, contents_of_channels(channels), "`channels`", asked)
 
     def to_sep005(self) -> list[dict[str, Any]]:
         """The channels after SEP 5 of SDyPy, called ``force_1`` and the like; `from_sep005` takes them back.
@@ -134,3 +134,66 @@ class Record(AbstractRecord):
         carried.
         """
         return channels_of(contents_of(self))
+
+    @classmethod
+    def from_dataframe(
+        cls,
+        frame: Any,
+        *,
+        time: str | None = None,
+        force: ChannelName = None,
+        displacement: ChannelName = None,
+        velocity: ChannelName = None,
+        acceleration: ChannelName = None,
+        base_acceleration: str | None = None,
+        units: Mapping[str, str] | None = None,
+        sensitivity: Mapping[str, str] | None = None,
+        rate: float | None = None,
+        where: Mapping[str, str | float] | None = None,
+        run: int | str | None = None,
+        at_rest: bool = False,
+        drive: Drive = "force",
+        name: str | None = None,
+    ) -> Self:
+        """The record in a table in memory, as `jfsm.read` reads it, which takes the same arguments.
+
+        Parameters
+        ----------
+        frame : DataFrame, Series, Table, Dataset or DataArray
+            Of pandas, polars, pyarrow or xarray. The clock is an index or a coordinate that holds instants (dates,
+            timedeltas, or numbers [s]), else a column, as in a file. Units stand in the headings, in a second row of
+            them, in ``frame.attrs["units"]`` by heading, or in ``attrs["units"]`` of an array of xarray.
+
+        Raises
+        ------
+        TypeError
+            If `frame` is none of these.
+        ValueError
+            As `jfsm.read`.
+        """
+        asked = Asked(
+            wanted=(force, displacement, velocity, acceleration, base_acceleration),
+            units=units,
+            sensitivity=sensitivity,
+            time=time,
+            rate=rate,
+            run=run,
+            at_rest=at_rest,
+            drive=drive,
+            name=name,
+        )
+        contents, called = contents_of_frame(frame), f"the {type(frame).__name__}"
+        return record_of(cls, rows_where(contents, called, where) if where else contents, called, asked)
+
+    def to_dataframe(self) -> Any:
+        """The channels as a DataFrame of pandas, which must be installed: columns called ``force_1`` and the like over
+        the instants [s], and ``attrs["units"]`` with the unit of each; `jfsm.read` takes it back.
+
+        Whether the structure was at rest, what drives it, the name and the notes are not carried.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            If pandas is not installed.
+        """
+        return frame_of(contents_of(self))

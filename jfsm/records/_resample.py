@@ -11,7 +11,7 @@ LOBES = 32  # of the windowed sinc on each side
 KAISER = 9.0  # side lobes of its window below −90 dB; the transition band is then 0.18 of the cut-off wide
 PASSBAND = 0.91  # cut-off over the lower of the two Nyquist frequencies: the transition ends there
 CLOSE = 0.1  # samples nearer than this share of the median step are one reading
-GAP = 3.0  # median steps without a sample from which on an interpolation is worth a word
+GAP = 3.5  # median steps without a sample from which on nothing is known between: more than two are missing
 HAIR = 1e-6  # of a sample, that rounding makes of none
 ROUNDED = 0.25  # share of a step up to which the digits of a time stamp may be missing
 MEMORY, FITTED = 48, 1024  # order of the prediction beyond the ends, and samples it is learnt from
@@ -71,8 +71,18 @@ def _rounding(time: Samples) -> float:
     return unit if float(np.max(np.abs(drift))) <= unit else 0.0  # otherwise the steps themselves differ
 
 
+def long_gaps(time: Samples) -> list[tuple[float, float]]:
+    """Last and next instant [s] of every gap of more than two samples."""
+    steps = np.diff(time)
+    wide = np.flatnonzero(steps > GAP * float(np.median(steps)))
+    return [(float(time[i]), float(time[i + 1])) for i in wide]
+
+
 def _even(time: Samples, values: Samples) -> tuple[Samples, float]:
-    """The samples on the uniform clock of the median step, and the longest step [s] that had to be bridged."""
+    """The samples on the uniform clock of the median step, and the longest step [s] that had to be bridged.
+
+    Short gaps are bridged by the spline through all samples beside them, long ones by straight lines.
+    """
     median = float(np.median(np.diff(time)))
     # Two readings at almost the same instant would make the spline follow their noise far beyond both.
     reading = np.concatenate([[0], np.cumsum(np.diff(time) > CLOSE * median)])
@@ -82,7 +92,17 @@ def _even(time: Samples, values: Samples) -> tuple[Samples, float]:
     columns = [np.bincount(reading, column) / weight for column in values.T]
     uniform = np.linspace(time[0], time[-1], max(2, round((time[-1] - time[0]) / median) + 1))
     together = np.stack(columns, axis=1) if columns else np.empty((merged.size, 0))
-    return CubicSpline(merged, together)(uniform), float(np.max(np.diff(merged)))
+    bounds = np.flatnonzero(np.diff(merged) > GAP * median)
+    result = (
+        np.stack([np.interp(uniform, merged, column) for column in together.T], axis=1)
+        if columns
+        else (np.empty((uniform.size, 0)))
+    )
+    for first, last in zip([0, *(bounds + 1)], [*bounds, merged.size - 1], strict=True):
+        inside = (uniform >= merged[first]) & (uniform <= merged[last])
+        if last - first > 2 and columns:
+            result[inside] = CubicSpline(merged[first : last + 1], together[first : last + 1])(uniform[inside])
+    return result, float(np.max(np.diff(merged)))
 
 
 def filtered(values: Samples, position: Samples, ratio: float) -> Samples:

@@ -138,6 +138,11 @@ def find_sensitivity(text: str, name: str, kind: str) -> Sensitivity:
     )
 
 
+def coherent_unit(dimension: Dimension) -> str | None:
+    """The unit that a record has for a quantity of this dimension, None if it has none."""
+    return _BY_DIMENSION[dimension][1] if dimension in _BY_DIMENSION else None
+
+
 def is_unit(text: str) -> bool:
     """Whether this text is the spelling of a unit."""
     return bool(text.strip()) and _find(text) is not None

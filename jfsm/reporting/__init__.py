@@ -16,6 +16,9 @@ from ._pictures import plot_diagnosis as plot_diagnosis
 from ._progress import bar as bar
 from ._progress import shown_by_default as shown_by_default
 from ._progress import stages as stages
+from ._shown_units import in_shown_unit as in_shown_unit
+from ._shown_units import said_as as said_as
+from ._shown_units import shown_in as shown_in
 from ._sketch import Picture as Picture
 from ._text import diagnosis_text as diagnosis_text
 from ._text import inspection_text as inspection_text

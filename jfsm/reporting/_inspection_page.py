@@ -13,6 +13,7 @@ from jfsm.reporting._inspection_tables import (
     small_percent,
 )
 from jfsm.reporting._quantities import number, percent, quantity, with_error
+from jfsm.reporting._shown_units import in_shown_words
 from jfsm.reporting._summary import Answer
 from jfsm.reporting._template import inline, template
 from jfsm.reporting._wording import counted, extent, listed
@@ -37,6 +38,7 @@ def render_inspection(d: Dictionary) -> str:
     str
         An HTML document.
     """
+    d = in_shown_words(d)
     findings, channels = d.get("findings") or (), d.get("channels") or ()
     warnings = [finding for finding in findings if finding["severity"] == "warning"]
     remarks = [finding for finding in findings if finding["severity"] != "warning"]

@@ -6,6 +6,7 @@ from typing import Any
 from jfsm.reporting._checks import checks_table, decisive_checks
 from jfsm.reporting._pictures import pictures
 from jfsm.reporting._quantities import number
+from jfsm.reporting._shown_units import in_shown_words
 from jfsm.reporting._summary import key_answers
 from jfsm.reporting._tables import (
     candidates_table,
@@ -13,6 +14,7 @@ from jfsm.reporting._tables import (
     detectable_table,
     findings_table,
     gain_table,
+    modes_table,
     refitted_table,
     rivals_table,
 )
@@ -45,6 +47,7 @@ def render_page(d: Mapping[str, Any]) -> str:
     ValueError
         If `d` is not the dictionary of a diagnosis.
     """
+    d = in_shown_words(d)
     findings, candidates = d.get("findings") or (), d.get("candidates") or ()
     record, decision = d.get("record") or {}, d.get("decision") or {}
     verdict = checked_verdict(d)
@@ -72,6 +75,7 @@ def render_page(d: Mapping[str, Any]) -> str:
             decision.get("checks") or (), "Every check, in the order in which they were made", decision
         ),
         refitted=refitted_table(d.get("refitted") or {}),
+        modes=modes_table(d.get("modes") or ()),
         channels=channels_table(record.get("channels") or ()),
         detectable=detectable_table(d.get("detectable") or {}),
         model=d.get("model") or (),

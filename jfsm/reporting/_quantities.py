@@ -4,6 +4,8 @@ import math
 import re
 from typing import NamedTuple
 
+from jfsm.reporting._shown_units import in_shown_unit
+
 ABSENT = "–"
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 # Units that take a prefix. Kiloseconds and kiloradians exist, but nobody reads them.
@@ -20,7 +22,13 @@ class Scale(NamedTuple):
 
 
 def scale_for(value: float | None, unit: str | None) -> Scale:
-    """Prefix that brings a value of this size between 0.1 and 1000, as in 29.8 µm for 2.98e-5 m."""
+    """Prefix that brings a value of this size between 0.1 and 1000, as in 29.8 µm for 2.98e-5 m.
+
+    Where another unit is asked for, that unit, and no prefix.
+    """
+    size, asked = in_shown_unit(unit or "")
+    if asked != (unit or ""):
+        return Scale(size, asked)
     unit = unit or ""
     size = abs(value) if value is not None and math.isfinite(value) else 0.0
     symbol = re.match(r"[A-Za-z]+(?![²³⁴⁵\d^*])", unit)

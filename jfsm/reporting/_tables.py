@@ -138,6 +138,30 @@ def refitted_table(refitted: Mapping[str, Dictionary]) -> Table:
     return Table("The model's own values", ("parameter", "given", "refitted", "95 % interval", "change"), tuple(rows))
 
 
+def modes_table(modes: Sequence[Dictionary]) -> Table:
+    """Frequency and damping ratio of the linear part, a row each: as given, and as the record has them."""
+    rows = []
+    for number_of_mode, mode in enumerate(modes, start=1):
+        for name, words in (("frequency", "frequency"), ("damping_ratio", "damping ratio")):
+            estimate = _in_percent(mode[name])
+            shown, bounds = _estimate_cells(estimate)
+            digits = digits_for(estimate["value"], estimate["low"], estimate["high"])
+            given = quantity(estimate["given"], estimate["unit"], digits)
+            rows.append((f"mode {number_of_mode}, {words}", given, shown, bounds))
+    headings = ("linear part", "given", "refitted", "95 % interval")
+    return Table("Frequency and damping", headings, tuple(rows))
+
+
+def _in_percent(estimate: Dictionary) -> dict[str, Any]:
+    """A number without unit in per cent; others as they are."""
+    if estimate["unit"] != "1":
+        return dict(estimate)
+    return {
+        "unit": "%",
+        **{key: None if (value := estimate[key]) is None else 100 * value for key in ("given", "value", "low", "high")},
+    }
+
+
 def channels_table(channels: Sequence[Dictionary]) -> Table:
     """What was measured: size and noise floor of each channel."""
     rows = []

@@ -13,12 +13,14 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from jfsm.reporting._inspection_tables import consistency_table, inspected_channels_table, periods_table
+from jfsm.reporting._shown_units import in_shown_words
 from jfsm.reporting._summary import Answer, key_answers
 from jfsm.reporting._tables import (
     Table,
     candidates_table,
     findings_table,
     gain_table,
+    modes_table,
     refitted_table,
     rivals_table,
 )
@@ -83,6 +85,7 @@ def plain_text(renderable: RenderableType, width: int) -> str:
 
 def _diagnosis(d: Mapping[str, Any], width: int) -> Group:
     verdict = checked_verdict(d)
+    d = in_shown_words(d)
     colour = TONES[verdict.tone]
     headline = Text.assemble((d.get("sentence") or verdict.meaning, "bold"))
     if d.get("advice"):
@@ -102,6 +105,7 @@ def _tables(d: Mapping[str, Any], width: int) -> Iterator[Table]:
     yield rivals_table(findings)
     yield gain_table((d.get("gain") or {}).get("channels") or {})
     yield refitted_table(d.get("refitted") or {})
+    yield modes_table(d.get("modes") or ())
     candidates = candidates_table((d.get("candidates") or ())[:MOST_CANDIDATES])
     yield candidates if width >= WIDE else candidates.only(*ESSENTIAL)
 
@@ -117,6 +121,7 @@ def answer_grid(answers: Iterable[Answer]) -> RenderableType:
 
 
 def _inspection(d: Mapping[str, Any], width: int) -> Group:
+    d = in_shown_words(d)
     head = Text.assemble((d.get("name") or "Record", "bold"), ("  " + ", ".join(extent(d)), "dim"))
     channels, findings = d.get("channels") or (), d.get("findings") or ()
     figures = inspected_channels_table(channels)

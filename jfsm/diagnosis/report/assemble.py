@@ -26,7 +26,7 @@ from ..look.looked import Looked
 from ..search.batches import LeftBehind
 from ..verdict.decision import Decision
 from ..verdict.judge import after_looks, evidence_behind
-from .estimates import Units, noise_by_channel, refitted_values, smallest_effects, unit_of
+from .estimates import Units, modes_of_trial, noise_by_channel, plain_modes, refitted_values, smallest_effects, unit_of
 from .findings import Ranked, findings_of, fitted_candidate, unfitted_candidate
 from .force_shape import Shape, shape_of
 from .late_forces import beside_late_forces, late_forces, times_of_forces
@@ -90,7 +90,7 @@ def assemble(
     findings = (*findings_of(reached.ranked(tested.trials), reached.winner, clipped, model, missing, first), *late)
     candidates = tuple(_candidates(tested, decision, refitted, model, units))
     winner = reached.winner if decision.winner != GIVEN else refitted
-    refit = refitted_values(winner, model, units)
+    refit, modes = refitted_values(winner, model, units), modes_of_trial(winner)
     between = [] if verdict == "consistent" else differences(winner)
     differ = [difference_sentence(one, unit_of(winner.structure, one.path, units)) for one in between]
     said = times_of_forces(reached.late, first, reached.assumed)
@@ -116,6 +116,7 @@ def assemble(
         "findings": as_plain(findings, lossless=False),
         "candidates": as_plain(candidates, lossless=False),
         "refitted": {p: {"given": model.values()[p], **as_plain(e, lossless=False)} for p, e in refit.items()},
+        "modes": plain_modes(model, modes),
         "between_records": {one.path: [list(interval) for interval in one.intervals] for one in between},
         "gain": plain_gain(gain),
         "notes": list(notes),
@@ -127,7 +128,7 @@ def assemble(
         verdict=decision.verdict, findings=findings, candidates=candidates, extended=extended, refitted=refit,
         gain=gain, detectable={c: s.size for c, s in smallest.items()}, noise=noise_by_channel(first), notes=notes,
         sentence=sentence, advice=advice, told=data, drawn=drawn, leading=leading,
-        decision=decision, finished=not unfinished.notes, untried=unfinished.untried,
+        modes=modes, decision=decision, finished=not unfinished.notes, untried=unfinished.untried,
     )  # fmt: skip
 
 

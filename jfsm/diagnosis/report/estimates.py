@@ -1,13 +1,16 @@
 """Numbers of a fitted hypothesis as estimates: value, interval and unit."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from ...identification import Nuisances
+import numpy as np
+
+from ...identification import Mode, Nuisances, modes_of, oscillations, ratios
 from ...structures import Structure
 from .._diagnosis import Estimate
 from ..advice.detection_limits import Smallest
 from ..evidence.fitted import Trial
+from ..evidence.plain import as_plain
 from ..hypotheses.effect import names, places
 
 Units = Mapping[Any, str]
@@ -34,6 +37,25 @@ def refitted_values(t: Trial, model: Structure, units: Units) -> dict[str, Estim
     """The model's own values that a trial fitted, by path."""
     fitted = {u.path for u in t.unknowns}
     return {path: estimate(t, path, units) for path in model.entries() if path in fitted}
+
+
+def modes_of_trial(t: Trial) -> tuple[Mode, ...]:
+    """Frequency and damping ratio of the modes of what is linear in a trial."""
+    return modes_of(t.structure, t.unknowns, t.theta, t.covariance)
+
+
+def plain_modes(model: Structure, found: Sequence[Mode]) -> list[dict[str, Any]]:
+    """The modes as a trial has them, each beside that of the model as given where that has as many."""
+    given = oscillations(model)
+    known = len(given) == len(found)
+    before = zip(np.abs(given) / (2 * np.pi), ratios(given), strict=True) if known else ((None, None) for _ in found)
+    return [
+        {
+            name: {"given": None if value is None else float(value), **as_plain(one, lossless=False)}
+            for name, value, one in zip(Mode._fields, values, mode, strict=True)
+        }
+        for values, mode in zip(before, found, strict=True)
+    ]
 
 
 def effect_values(t: Trial, which: int, model: Structure, units: Units) -> dict[str, Estimate]:

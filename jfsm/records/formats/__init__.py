@@ -5,6 +5,7 @@ from pathlib import Path
 from jfsm.records.formats.arrow import ArrowFormat
 from jfsm.records.formats.base import AbstractFormat
 from jfsm.records.formats.base import Contents as Contents
+from jfsm.records.formats.c3d import C3dFormat
 from jfsm.records.formats.hdf5 import Hdf5Format
 from jfsm.records.formats.json_columns import JsonFormat
 from jfsm.records.formats.lvm import LvmFormat
@@ -21,6 +22,7 @@ from jfsm.records.formats.strong_motion import CosmosFormat, KnetFormat, PeerFor
 from jfsm.records.formats.tdms import TdmsFormat
 from jfsm.records.formats.text import TextFormat
 from jfsm.records.formats.uff import UffFormat
+from jfsm.records.formats.ulog import UlogFormat
 from jfsm.records.formats.wav import WavFormat
 
 # The first that recognises a file reads it; text, which is told by not being anything else, comes last.
@@ -36,6 +38,8 @@ FORMATS: tuple[AbstractFormat, ...] = (
     SpreadsheetFormat(),
     ArrowFormat(),
     RosFormat(),
+    UlogFormat(),
+    C3dFormat(),
     LvmFormat(),
     JsonFormat(),
     PeerFormat(),
@@ -67,8 +71,10 @@ def format_of(path: Path) -> AbstractFormat:
     for candidate in FORMATS[:-1]:
         if candidate.recognises(begins_with, path):
             return candidate
+    if is_stranger(begins_with, path):
+        raise refusal(begins_with, path, None)
     meant = next((each.name for each in FORMATS[:-1] if path.suffix.lower() in each.suffixes), None)
-    if is_stranger(begins_with) or not FORMATS[-1].recognises(begins_with, path):
+    if not FORMATS[-1].recognises(begins_with, path):
         raise refusal(begins_with, path, meant)
     return FORMATS[-1]
 

@@ -33,6 +33,7 @@ _TIME_NAMES = tuple(
 )
 _FREQUENCY = re.compile(r"(?:freq|frequency|frequenz|fr[ée]quence)(?:[ _]*hz)?|hz", re.IGNORECASE)
 _COUNTS = {"millis": "ms", "micros": "us"}  # functions of Arduino, and the units of what they give
+_NS = 1_000_000_000
 AGREES = 0.005  # relative difference of two statements of one rate that is worth no word
 
 
@@ -81,11 +82,11 @@ def clock_of(
         return finder.of(None)
     first, common = clocks[0]
     for choice, clock in clocks[1:]:
-        if clock.seconds is not common.seconds and not np.array_equal(clock.seconds, common.seconds):
+        if not _are_one(common, clock):
             raise ValueError(
                 f"{source} must have channels of one clock to make one record; {first.array!r} "
                 f"{_described(common.seconds)}, {choice.array!r} {_described(clock.seconds)}. "
-                f"{_apart(contents, common, clock)}Read them into a record each, and bring these to one clock by "
+                f"{_apart(common, clock)}Read them into a record each, and bring these to one clock by "
                 f"jfsm.align(records); or pass rate=... [Hz] if the file is wrong."
             )
     return common._replace(notes=(*common.notes, *finder.doubts(common)))
@@ -340,13 +341,23 @@ def _counted(contents: Contents, source: str, chosen: Sequence[Choice], rate: fl
     return np.arange(size) / rate
 
 
-def _apart(contents: Contents, one: Clock, other: Clock) -> str:
-    """How far apart two clocks begin, and from when they count, if the file states it."""
-    if contents.begins is None or not one.seconds.size or not other.seconds.size:
+def _are_one(one: Clock, other: Clock) -> bool:
+    """Whether two clocks tick at the same instants."""
+    if one.seconds is not other.seconds and not np.array_equal(one.seconds, other.seconds):
+        return False
+    return one.begins is None or other.begins is None or one.begins == other.begins
+
+
+def _apart(one: Clock, other: Clock) -> str:
+    """How far apart two clocks begin, if the file states from when they count."""
+    if one.begins is None or other.begins is None or not one.seconds.size or not other.seconds.size:
         return ""
-    starts = (contents.begins + np.timedelta64(round(float(clock.seconds[0]) * 1e9), "ns") for clock in (one, other))
+    starts = [
+        begins + np.timedelta64(round(float(clock.seconds[0]) * _NS), "ns")
+        for clock, begins in ((one, one.begins), (other, other.begins))
+    ]
     begun = " and ".join(str(start).replace("T", " ") for start in starts)
-    return f"They begin at {begun}, {abs(other.seconds[0] - one.seconds[0]):.9g} s apart. "
+    return f"They begin at {begun}, {abs((starts[1] - starts[0]) / np.timedelta64(1, 'ns')) / _NS:.9g} s apart. "
 
 
 def _described(clock: Seconds) -> str:

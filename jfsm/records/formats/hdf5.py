@@ -132,7 +132,7 @@ def opened(path: Path, demand: str) -> Iterator["h5py.File"]:
     Raises
     ------
     ValueError
-        If it is no HDF5 file or a part of one, beginning with `demand`.
+        If it is no HDF5 file or a part of one, or parts of it cannot be read, beginning with `demand`.
     """
     import h5py  # loaded when a file asks for it, so that importing jfsm stays quick
 
@@ -143,7 +143,10 @@ def opened(path: Path, demand: str) -> Iterator["h5py.File"]:
             f"{demand}; it cannot be opened as one ({error}), and may be cut short. Write or copy it again."
         ) from error
     with file:
-        yield file
+        try:
+            yield file
+        except (RuntimeError, KeyError, OSError, json.JSONDecodeError) as error:  # of a part that cannot be read
+            raise ValueError(f"{demand}; parts of it cannot be read ({error}). Write or copy it again.") from error
 
 
 def dataset(file: "h5py.File", name: str) -> np.ndarray:

@@ -42,53 +42,59 @@ def headings_of(above: Sequence[Sequence[str]], width: int) -> Headings:
 
     The row of units may stand below or above the names; a row that holds values is neither.
     """
-    fitting = {place: _fitted(row, width) for place, row in enumerate(above)}
-    rows = [(place, row) for place, row in fitting.items() if row is not None]
-    rows = [
-        (place, row)
-        for at, (place, row) in enumerate(rows)
-        if not any(_VALUE.match(field) for field in row)
-        or (at + 2 == len(rows) and are_units(rows[at + 1][1]) and not all(_VALUE.match(field) for field in row))
-    ]
-    texts, units, used, notes = [""] * width, [""] * width, set(), list[str]()
-    if rows:
-        last = len(rows) - 1
-        if are_units(rows[last][1]) and last and not are_units(rows[last - 1][1]):
-            names_at, units_at = last - 1, last
-        elif last and not are_units(rows[last][1]) and are_units(rows[last - 1][1]):
-            names_at, units_at = last, last - 1
-        else:
-            names_at, units_at = last, None
-        used, texts = {rows[names_at][0]}, list(rows[names_at][1])
-        if units_at is not None:
-            used.add(rows[units_at][0])
-            units = [field.strip("[](){}<> ") for field in rows[units_at][1]]
-        elif all(is_unit(text) for text in texts if text):
-            units = list(texts)
-            notes.append(f"The only heading reads like units ({', '.join(texts)}); it is taken for names and units.")
+    rows = _readable(above, width)
+    texts, units, used, notes = _names_and_units(rows, width)
     bare = list(texts)
     for place, text in enumerate(texts):
         name, unit = split_unit(text)
-        if unit and not (units[place] and units[place] == text):
-            bare[place] = name
-            if units[place] and units[place] != unit:
-                notes.append(
-                    f"The heading {text!r} and the row of units ({units[place]!r}) differ; the heading counts."
-                )
-            units[place] = unit
+        if not unit or (units[place] and units[place] == text):
+            continue
+        if units[place] and units[place] != unit:
+            notes.append(f"The heading {text!r} and the row of units ({units[place]!r}) differ; the heading counts.")
+        bare[place], units[place] = name, unit
     names = _distinct(bare, texts)
+    stated = {name: unit for name, unit in zip(names, units, strict=True) if unit}
+    return Headings(names, stated, _aliases(names, texts, bare), used, notes)
+
+
+_Placed = tuple[int, list[str]]  # a row and where it stands among those above the table
+
+
+def _readable(above: Sequence[Sequence[str]], width: int) -> list[_Placed]:
+    """The rows of that width that hold no values; of those before the last, names may do so above a row of units."""
+    fitting = ((place, _fitted(row, width)) for place, row in enumerate(above))
+    rows = [(place, row) for place, row in fitting if row is not None]
+
+    def is_readable(at: int) -> bool:
+        values = [bool(_VALUE.match(field)) for field in rows[at][1]]
+        return not any(values) or (at + 2 == len(rows) and are_units(rows[at + 1][1]) and not all(values))
+
+    return [row for at, row in enumerate(rows) if is_readable(at)]
+
+
+def _names_and_units(rows: Sequence[_Placed], width: int) -> tuple[list[str], list[str], set[int], list[str]]:
+    """The row of names, that of units, their places, and notes: units stand below or above the names."""
+    if not rows:
+        return [""] * width, [""] * width, set(), []
+    last, before = rows[-1], rows[-2] if len(rows) > 1 else None
+    if before is not None and are_units(last[1]) != are_units(before[1]):
+        names, units = (before, last) if are_units(last[1]) else (last, before)
+        return list(names[1]), [field.strip("[](){}<> ") for field in units[1]], {names[0], units[0]}, []
+    texts = list(last[1])
+    if not all(is_unit(text) for text in texts if text):
+        return texts, [""] * width, {last[0]}, []
+    note = f"The only heading reads like units ({', '.join(texts)}); it is taken for names and units."
+    return texts, list(texts), {last[0]}, [note]
+
+
+def _aliases(names: Sequence[str], texts: Sequence[str], bare: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """What else columns are called: their whole headings, their bare names, their numbers."""
     aliases: dict[str, dict[str, None]] = {}
     for place, name in enumerate(names):
         for text in (texts[place], bare[place], f"column {place + 1}"):
             if text and text != name:
                 aliases.setdefault(text, {})[name] = None
-    return Headings(
-        names,
-        {name: unit for name, unit in zip(names, units, strict=True) if unit},
-        {text: tuple(found) for text, found in aliases.items()},
-        used,
-        notes,
-    )
+    return {text: tuple(found) for text, found in aliases.items()}
 
 
 def split_unit(text: str) -> tuple[str, str]:

@@ -1,6 +1,6 @@
 """LabVIEW measurement files (.lvm), after National Instruments' specification of the text format, version 2."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import ClassVar
@@ -36,81 +36,79 @@ class LvmFormat(AbstractFormat):
         if top is None:
             raise ValueError(f"{path.name} must be a LabVIEW measurement file; its header has no end. Write it again.")
         head = {row[0]: row[1] for row in rows[1:top] if len(row) > 1 and row[0]}
-        mark: Mark = "," if head.get("Decimal_Separator", ".") == "," else "."
-        segments = [_Segment(part, first, head, mark, path) for first, part in _segments(rows[top + 1 :], top + 2)]
+        segments = [_Segment(part, first, head, path) for first, part in _segments(rows[top + 1 :], top + 2)]
         if not segments:
             raise ValueError(f"{path.name} must hold a segment of samples; it holds none. Write or copy it again.")
-        begun = " ".join(head[key] for key in ("Date", "Time") if head.get(key))
-        note = [f"Measured from {begun} on, by the head of the file."] if begun else []
-        runs = [segment.contents(note) for segment in segments]
+        runs = [segment.contents(_of_the_date(head)) for segment in segments]
         return runs[0] if len(runs) == 1 else Contents({}, runs=tuple(runs))
+
+
+def _of_the_date(head: Mapping[str, str]) -> list[str]:
+    begun = " ".join(head[key] for key in ("Date", "Time") if head.get(key))
+    return [f"Measured from {begun} on, by the head of the file."] if begun else []
 
 
 class _Segment:
     """One segment: its header, the row of names, and the rows of samples."""
 
-    def __init__(self, rows: list[list[str]], first: int, head: dict[str, str], mark: Mark, path: Path):
+    def __init__(self, rows: list[list[str]], first: int, head: Mapping[str, str], path: Path):
         self._path = path
-        self._mark: Mark = mark
+        self._mark: Mark = "," if head.get("Decimal_Separator", ".") == "," else "."
         end = next((place for place, row in enumerate(rows) if row[0] == END), -1)
         self._head = {row[0]: row[1:] for row in rows[: end + 1] if row[0]}
-        self._places = {place: row for place, row in enumerate(rows[end + 1 :]) if any(row)}
-        self._names_row = next(iter(self._places.values()), [])
-        self._data = list(self._places.items())[1:]
+        table = [(place, row) for place, row in enumerate(rows[end + 1 :]) if any(row)]
+        names, self._data = (table[0][1], table[1:]) if table else ([], [])
         self._offset = first + end + 1
         self._columns = self._head.get("X_Columns", [head.get("X_Columns", "One")])[0].lower()
+        self._comment = names.index("Comment") if "Comment" in names else None
+        self._clocks = [place for place, name in enumerate(names) if name.startswith("X_Value")]
+        at = [place for place, name in enumerate(names) if name and place not in (self._comment, *self._clocks)]
+        self._where = dict(zip(unique_names(names[place] for place in at), at, strict=True))
+        self._order = {name: place for place, name in enumerate(self._where)}
 
     def contents(self, notes: Sequence[str]) -> Contents:
-        names_row = self._names_row
-        comment = [place for place, name in enumerate(names_row) if name == "Comment"]
-        clocks_at = [place for place, name in enumerate(names_row) if name.startswith("X_Value")]
-        at = [place for place, name in enumerate(names_row) if name and place not in (*comment, *clocks_at)]
-        names = unique_names(names_row[place] for place in at)
-        where = dict(zip(names, at, strict=True))
-        order = {name: place for place, name in enumerate(names)}
-        said = [*notes]
-        remarks = [row[comment[0]] for _, row in self._data if comment and len(row) > comment[0] and row[comment[0]]]
-        if remarks:
-            said.append(f"{len(remarks)} comments stand beside the samples: {', '.join(map(repr, remarks[:3]))}.")
-        if self._head.get("Notes") and any(self._head["Notes"]):
-            said.append(f"The file notes: {' '.join(self._head['Notes']).strip()!r}.")
-        announced = self._numbers("Samples")
-        for name, place in order.items():
-            found = sum(1 for _, row in self._data if len(row) > where[name] and row[where[name]])
-            if place < len(announced) and announced[place] != found:
-                said.append(f"{name!r} announces {announced[place]:.0f} samples; {found} stand in the file.")
-
-        def samples(name: str) -> np.ndarray:
-            return np.array(
-                [self._number(place, row, where[name]) for place, row in self._data if self._has(row, where[name])]
-            )
-
-        def clock(name: str) -> np.ndarray:
-            place, size = order[name], len([1 for _, row in self._data if self._has(row, where[name])])
-            starts, steps = self._numbers("X0"), self._numbers("Delta_X")
-            before = [x for x in clocks_at if x < where[name]]
-            if self._columns != "no" and before:
-                return np.array(
-                    [self._number(at, row, before[-1]) for at, row in self._data if self._has(row, where[name])]
-                )
-            if place >= len(steps):
-                raise ValueError(
-                    f"{self._path.name} must state Delta_X for {name!r}; it states {len(steps)} of them. "
-                    f"Pass rate=... [Hz]."
-                )
-            return (starts[place] if place < len(starts) else 0.0) + steps[place] * np.arange(size)
-
+        """Channels with their clocks, after these notes of the file."""
         units = self._head.get("Y_Unit_Label", [])
         return Contents(
-            Lazy(names, samples),
-            {name: units[place] for name, place in order.items() if place < len(units) and units[place]},
-            clocks=Lazy(names, clock),
-            notes=tuple(said),
+            Lazy(self._where, lambda name: self._column(name, self._where[name])),
+            {name: units[place] for name, place in self._order.items() if place < len(units) and units[place]},
+            clocks=Lazy(self._where, self._clock),
+            notes=(*notes, *self._said()),
             title=f"{len(self._data)} rows from line {self._offset + (self._data[0][0] if self._data else 0)} on",
         )
 
-    def _has(self, row: list[str], column: int) -> bool:
-        return column < len(row) and bool(row[column])
+    def _said(self) -> Iterator[str]:
+        """Comments, notes, and numbers of samples that are not those announced."""
+        remarks = [] if self._comment is None else [row[self._comment] for _, row in self._rows(self._comment)]
+        if remarks:
+            yield f"{len(remarks)} comments stand beside the samples: {', '.join(map(repr, remarks[:3]))}."
+        if any(self._head.get("Notes", ())):
+            yield f"The file notes: {' '.join(self._head['Notes']).strip()!r}."
+        for (name, at), announced in zip(self._where.items(), self._numbers("Samples"), strict=False):
+            if announced != (found := len(self._rows(at))):
+                yield f"{name!r} announces {announced:.0f} samples; {found} stand in the file."
+
+    def _clock(self, name: str) -> np.ndarray:
+        """Instants of a channel: the X column ahead of it, else its start and step."""
+        before = [place for place in self._clocks if place < self._where[name]]
+        if self._columns != "no" and before:
+            return self._column(name, before[-1])
+        place, starts, steps = self._order[name], self._numbers("X0"), self._numbers("Delta_X")
+        if place >= len(steps):
+            raise ValueError(
+                f"{self._path.name} must state Delta_X for {name!r}; it states {len(steps)} of them. "
+                f"Pass rate=... [Hz]."
+            )
+        start = starts[place] if place < len(starts) else 0.0
+        return start + steps[place] * np.arange(len(self._rows(self._where[name])))
+
+    def _column(self, name: str, at: int) -> np.ndarray:
+        """Numbers of a column in the rows in which a channel has samples."""
+        return np.array([self._number(place, row, at) for place, row in self._rows(self._where[name])])
+
+    def _rows(self, column: int) -> list[tuple[int, list[str]]]:
+        """Rows in which a column holds something, with their places."""
+        return [(place, row) for place, row in self._data if column < len(row) and row[column]]
 
     def _numbers(self, key: str) -> list[float]:
         values: list[float] = []

@@ -9,6 +9,7 @@ import scipy.io
 
 from jfsm.records.formats.base import ABOUT, AbstractFormat, Contents, Lazy
 from jfsm.records.formats.hdf5 import NUMERIC, dataset, opened
+from jfsm.records.formats.mat5 import require_sound
 
 
 class MatFormat(AbstractFormat):
@@ -22,6 +23,7 @@ class MatFormat(AbstractFormat):
 
     def load(self, path: Path) -> Contents:
         try:
+            require_sound(path)
             variables = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
         except NotImplementedError:
             return _version_7_3(path)

@@ -20,7 +20,7 @@ class NpyFormat(AbstractFormat):
     def load(self, path: Path) -> Contents:
         try:
             array = np.load(path, allow_pickle=False)
-        except (ValueError, EOFError) as error:
+        except Exception as error:  # of a header that numpy cannot make out, among others
             raise ValueError(
                 f"{path.name} must be an array of numbers of numpy.save; it holds objects, or is cut short. Save the "
                 f"numbers alone."

@@ -1,5 +1,7 @@
 """ROS 1 and ROS 2 recordings (.bag, .mcap, .db3), through rosbags (an optional extra)."""
 
+import math
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, ClassVar
@@ -41,70 +43,98 @@ class RosFormat(AbstractFormat):
         ending = next(ending for mark, ending in _ENDINGS.items() if begins_with.startswith(mark))
         if path.suffix.lower() != ending:
             raise ValueError(f"{path.name} is a ROS recording, which must end in {ending}. Rename it.")
-        first: dict[str, Any] = {}
-        sensor: set[str] = set()
-        notes: list[str] = []
-        counts: dict[str, int] = {}
-        zero: int | None = None
-        for topic, recorded, message in self._messages(highlevel, path, None):
-            stamp = _stamp(message)
-            zero = min(recorded, zero) if zero is not None else recorded
-            counts[topic] = counts.get(topic, 0) + 1
-            if topic not in first:
-                first[topic] = message
-                if stamp:
-                    sensor.add(topic)
-                    zero = min(zero, stamp)
-        names = {name: (topic, field) for topic, message in first.items() for name, field in _numbers(topic, message)}
-        if not names or zero is None:
-            raise ValueError(f"{path.name} must hold messages with numbers; it holds none. Record the topics again.")
-        begins = np.datetime64(zero, "ns")
-        cache: dict[str, tuple[np.ndarray, list[Any]]] = {}
+        return _Recording(highlevel, path).contents()
 
-        def of_topic(topic: str) -> tuple[np.ndarray, list[Any]]:
-            if topic not in cache:
-                cache.clear()  # one topic at a time
-                taken = [
-                    ((_stamp(message) if topic in sensor else recorded) - zero, message)
-                    for _, recorded, message in self._messages(highlevel, path, topic)
-                ]
-                taken.sort(key=lambda pair: pair[0])
-                cache[topic] = np.array([at for at, _ in taken]) * 1e-9, [message for _, message in taken]
-            return cache[topic]
 
-        def samples(name: str) -> np.ndarray:
-            topic, field = names[name]
-            return np.array([_value(message, field) for message in of_topic(topic)[1]])
+class _Recording:
+    """A recording whose topics were looked through once; samples are read topic by topic.
 
-        if sensor:
-            notes.append(f"Clocks are those of the sensors (header.stamp) on {', '.join(sorted(sensor)[:4])}.")
-        if set(first) - sensor:
-            notes.append(f"Clocks are those of the recorder on {', '.join(sorted(set(first) - sensor)[:4])}.")
-        units = {
-            name: UNITS[part]
-            for name, (topic, field) in names.items()
-            for part in field.split(".")
-            if part in UNITS and getattr(first[topic], "__msgtype__", "").startswith(STANDARD)
+    `first` holds the first message of each topic, `sensor` the topics that have the sensor's stamps, `zero` the first
+    of all stamps [ns].
+    """
+
+    def __init__(self, highlevel: Any, path: Path):
+        self._highlevel, self._path = highlevel, path
+        self.first: dict[str, Any] = {}
+        self.sensor: set[str] = set()
+        self._announced: dict[str, int] = {}
+        counted, zero = Counter[str](), math.inf
+        for topic, recorded, message in self._messages(None):
+            zero = min(recorded, zero)
+            counted[topic] += 1
+            if topic in self.first:
+                continue
+            self.first[topic] = message
+            if stamp := _stamp(message):
+                self.sensor.add(topic)
+                zero = min(stamp, zero)
+        self.names = {
+            name: (topic, field) for topic, message in self.first.items() for name, field in _numbers(topic, message)
         }
+        if not self.names:
+            raise ValueError(f"{path.name} must hold messages with numbers; it holds none. Record the topics again.")
+        self.zero = int(zero)
+        self._missing = {
+            topic: announced - counted[topic]
+            for topic, announced in self._announced.items()
+            if announced != counted[topic]
+        }
+        self._read: dict[str, tuple[np.ndarray, list[Any]]] = {}
+
+    def contents(self) -> Contents:
+        """Every number with its unit, on the clock of its topic."""
         return Contents(
-            Lazy(names, samples),
-            units,
-            clocks=Lazy(names, lambda name: of_topic(names[name][0])[0]),
-            notes=tuple(notes),
-            begins=begins,
+            Lazy(self.names, self._samples),
+            {name: unit for name in self.names if (unit := self._unit(name))},
+            clocks=Lazy(self.names, lambda name: self._topic(self.names[name][0])[0]),
+            notes=tuple(self._notes()),
+            begins=np.datetime64(self.zero, "ns"),
         )
 
-    def _messages(self, highlevel: Any, path: Path, topic: str | None) -> Iterator[tuple[str, int, Any]]:
+    def _samples(self, name: str) -> np.ndarray:
+        topic, field = self.names[name]
+        return np.array([_value(message, field) for message in self._topic(topic)[1]])
+
+    def _topic(self, topic: str) -> tuple[np.ndarray, list[Any]]:
+        """Instants [s] and messages of a topic, in the order of its stamps."""
+        if topic not in self._read:
+            self._read.clear()  # one topic at a time
+            taken = [
+                ((_stamp(message) if topic in self.sensor else recorded) - self.zero, message)
+                for _, recorded, message in self._messages(topic)
+            ]
+            taken.sort(key=lambda pair: pair[0])
+            self._read[topic] = np.array([at for at, _ in taken]) * 1e-9, [message for _, message in taken]
+        return self._read[topic]
+
+    def _unit(self, name: str) -> str | None:
+        topic, field = self.names[name]
+        if not getattr(self.first[topic], "__msgtype__", "").startswith(STANDARD):
+            return None
+        return next((UNITS[part] for part in reversed(field.split(".")) if part in UNITS), None)
+
+    def _notes(self) -> Iterator[str]:
+        for topic, missing in self._missing.items():
+            yield f"{topic} announces {missing} more messages than can be read: the recording is damaged."
+        if self.sensor:
+            yield f"Clocks are those of the sensors (header.stamp) on {', '.join(sorted(self.sensor)[:4])}."
+        if others := set(self.first) - self.sensor:
+            yield f"Clocks are those of the recorder on {', '.join(sorted(others)[:4])}."
+
+    def _messages(self, topic: str | None) -> Iterator[tuple[str, int, Any]]:
         """Topic, the recorder's stamp [ns] and message; of one topic, or of all that can be decoded."""
         try:
-            with highlevel.AnyReader([path]) as reader:
+            with self._highlevel.AnyReader([self._path]) as reader:
                 wanted = [each for each in reader.connections if topic is None or each.topic == topic]
+                self._announced = dict.fromkeys((each.topic for each in wanted), 0)
+                for each in wanted:
+                    self._announced[each.topic] += each.msgcount
                 for connection, stamp, raw in reader.messages(connections=wanted):
                     yield connection.topic, stamp, reader.deserialize(raw, connection.msgtype)
         except Exception as error:  # whatever the reader stumbles over in bytes that are no such file
             raise ValueError(
-                f"{path.name} must be a ROS recording with message definitions; it cannot be read as one ({error}). "
-                f"Copy it again, or convert it by `ros2 bag convert` to mcap."
+                f"{self._path.name} must be a ROS recording with message definitions; it cannot be read as one "
+                f"({error}). Copy it again, or convert it by `ros2 bag convert` to mcap."
             ) from error
 
 

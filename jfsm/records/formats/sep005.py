@@ -1,6 +1,7 @@
 """Channels as dictionaries, after the SDyPy enhancement proposal 5 (unified time series)."""
 
 from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,25 @@ def contents_of_channels(channels: Mapping[str, Any] | Iterable[Mapping[str, Any
     ValueError
         If a channel lacks a key or two have one name.
     """
-    given: list[Any] = [channels] if isinstance(channels, Mapping) else list(channels)
+    given = _checked([channels] if isinstance(channels, Mapping) else list(channels))
+    begins = min(filter(None, map(_start, given.values())), default=None)
+    begun = sorted({str(channel["start_timestamp"]) for channel in given.values() if channel.get("start_timestamp")})
+    return Contents(
+        {name: np.asarray(channel["data"]) for name, channel in given.items()},
+        {name: str(channel["unit_str"]) for name, channel in given.items() if channel["unit_str"]},
+        clocks={name: _clock(channel) + _late(channel, begins) for name, channel in given.items()},
+        kinds={
+            name: QUANTITIES[channel["quantity"]]
+            for name, channel in given.items()
+            if channel.get("quantity") in QUANTITIES
+        },
+        notes=(f"Measured from {', '.join(begun)}.",) if begun and begins is None else (),
+        begins=begins,
+    )
+
+
+def _checked(given: list[Any]) -> dict[str, Mapping[str, Any]]:
+    """The channels by name, each with what it needs and a name of its own."""
     for place, channel in enumerate(given):
         if not isinstance(channel, Mapping):
             raise TypeError(
@@ -41,18 +60,7 @@ def contents_of_channels(channels: Mapping[str, Any] | Iterable[Mapping[str, Any
     twins = sorted({name for name in names if names.count(name) > 1})
     if twins:
         raise ValueError(f"`channels` must have names of their own; {twins} occur more than once. Rename them.")
-    begun = sorted({str(channel["start_timestamp"]) for channel in given if channel.get("start_timestamp")})
-    return Contents(
-        {name: np.asarray(channel["data"]) for name, channel in zip(names, given, strict=True)},
-        {name: str(channel["unit_str"]) for name, channel in zip(names, given, strict=True) if channel["unit_str"]},
-        clocks={name: _clock(channel) for name, channel in zip(names, given, strict=True)},
-        kinds={
-            name: QUANTITIES[channel["quantity"]]
-            for name, channel in zip(names, given, strict=True)
-            if channel.get("quantity") in QUANTITIES
-        },
-        notes=(f"Measured from {', '.join(begun)}.",) if begun else (),
-    )
+    return dict(zip(names, given, strict=True))
 
 
 def channels_of(contents: Contents) -> list[dict[str, Any]]:
@@ -75,6 +83,22 @@ def channels_of(contents: Contents) -> list[dict[str, Any]]:
         for name, array in contents.arrays.items()
         if name != "time"
     ]
+
+
+def _start(channel: Mapping[str, Any]) -> np.datetime64 | None:
+    """When a channel began, in UTC where it states a zone; None if it does not say so as a date."""
+    try:
+        stamp = datetime.fromisoformat(str(channel.get("start_timestamp") or ""))
+    except ValueError:
+        return None
+    stamp = stamp.astimezone(UTC).replace(tzinfo=None) if stamp.tzinfo else stamp
+    return np.datetime64(stamp, "ns")
+
+
+def _late(channel: Mapping[str, Any], begins: np.datetime64 | None) -> float:
+    """Seconds by which a channel began after the first of all."""
+    start = _start(channel)
+    return 0.0 if start is None or begins is None else float((start - begins) / np.timedelta64(1, "ns")) * 1e-9
 
 
 def _clock(channel: Mapping[str, Any]) -> np.ndarray:

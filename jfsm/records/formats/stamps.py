@@ -69,7 +69,7 @@ def instants_of_numbers(values: NDArray[Any], factor: float | None, exact: Calla
     if values.dtype.kind == "M":
         return _since(values.astype("datetime64[ns]"), "")
     if values.dtype.kind == "m":
-        return Instants(values.astype("timedelta64[ns]").astype(np.int64) / _NS, None, ())
+        return Instants(_in_seconds(values), None, ())
     numbers = np.asarray(values, dtype=np.float64)
     finite = numbers[:1000][np.isfinite(numbers[:1000])]
     if finite.size < 2:
@@ -167,13 +167,21 @@ def was_unwrapped(numbers: Seconds) -> bool:
 
 
 def _since(stamps: NDArray[Any], words: str) -> Instants:
-    seconds = (stamps - stamps[0]).astype(np.int64) / _NS
-    return _from_first(seconds, stamps[0], (words,) if words else ())
+    first = stamps[~np.isnat(stamps)][:1]
+    if not first.size:
+        return Instants(np.full(stamps.shape, np.nan), None, ())
+    return _from_first(_in_seconds(stamps - first), first[0], (words,) if words else ())
+
+
+def _in_seconds(spans: NDArray[Any]) -> Seconds:
+    """Spans of time in seconds; those that are missing are NaN."""
+    return np.where(np.isnat(spans), np.nan, spans.astype("timedelta64[ns]").astype(np.int64) / _NS)
 
 
 def _from_first(seconds: Seconds, zero: np.datetime64, notes: tuple[str, ...]) -> Instants:
-    begins = zero + np.timedelta64(round(float(seconds[0]) * _NS), "ns")
-    return Instants(seconds - seconds[0], begins, notes)
+    first = float(seconds[0]) if np.isfinite(seconds[0]) else 0.0
+    begins = zero + np.timedelta64(round(first * _NS), "ns")
+    return Instants(seconds - first, begins, notes)
 
 
 def _shown(stamp: np.datetime64) -> str:

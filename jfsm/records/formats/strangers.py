@@ -14,7 +14,12 @@ _KNOWN: tuple[tuple[bytes, str, str], ...] = (
     (b"\x89PNG", "a picture", "Export the numbers as text."),
     (b"\xff\xd8\xff", "a picture", "Export the numbers as text."),
     (b"GIF8", "a picture", "Export the numbers as text."),
-    (b"|CF,", "an imc FAMOS file", "Export it as text or MATLAB."),
+    (b"|CF,", "an imc FAMOS file", "Export it from FAMOS as text or MATLAB."),
+    (b"\xa3\x95\x80", "an ArduPilot log", "Convert it: `mavlogdump.py --format csv --types IMU FILE > imu.csv`."),
+    (b"\x94\x13", "a catman file", "Export it from catman as text or MATLAB."),
+    (b"\x96\x13", "a catman file", "Export it from catman as text or MATLAB."),
+    (b"H Product:Blackbox", "a Betaflight log", "Convert it: `blackbox_decode FILE` writes csv."),
+    (b"DIAdem", "a DIAdem file", "Export it from DIAdem as TDMS or text."),
     (b"CDF\x01", "a netCDF 3 file", "Convert it to netCDF 4 (nccopy -k nc4)."),
     (b"CDF\x02", "a netCDF 3 file", "Convert it to netCDF 4 (nccopy -k nc4)."),
     (b"SQLite format 3", "an SQLite database", "Export the table as text."),
@@ -23,9 +28,29 @@ _KNOWN: tuple[tuple[bytes, str, str], ...] = (
 )
 
 
-def is_stranger(begins_with: bytes) -> bool:
-    """Whether a file is known to be of a kind that is not read."""
-    return any(begins_with.startswith(mark) for mark, _, _ in _KNOWN)
+# Endings of recorders whose files have no mark of their own that is known here, and archives of theirs.
+_ENDINGS: dict[str, tuple[str, str]] = {
+    **dict.fromkeys(
+        (".dxd", ".dxz", ".d7d", ".d7z"), ("a Dewesoft file", "Export it from DewesoftX as MATLAB or text.")
+    ),
+    **dict.fromkeys((".tdm", ".tdx"), ("a DIAdem file", "Export it from DIAdem as TDMS or text.")),
+    **dict.fromkeys((".wfm", ".isf"), ("a file of an oscilloscope", "Save the waveform as csv.")),
+    **dict.fromkeys((".bbl", ".bfl"), ("a Betaflight log", "Convert it: `blackbox_decode FILE` writes csv.")),
+    ".ide": ("an enDAQ recording", "Export it by enDAQ Lab as csv or MATLAB."),
+    ".rsp": ("an RPC file", "Export it as text or MATLAB."),
+}
+
+
+def is_stranger(begins_with: bytes, path: Path) -> bool:
+    """Whether a file is known to be of a kind that is not read: by its bytes, or as a binary file by its ending."""
+    return _stranger(begins_with, path) is not None
+
+
+def _stranger(begins_with: bytes, path: Path) -> tuple[str, str] | None:
+    binary = b"\0" in begins_with or begins_with.startswith(b"PK\x03\x04")
+    if binary and path.suffix.lower() in _ENDINGS:
+        return _ENDINGS[path.suffix.lower()]
+    return next(((what, remedy) for mark, what, remedy in _KNOWN if begins_with.startswith(mark)), None)
 
 
 def refusal(begins_with: bytes, path: Path, meant: str | None) -> ValueError:
@@ -33,9 +58,10 @@ def refusal(begins_with: bytes, path: Path, meant: str | None) -> ValueError:
 
     `meant` is what its ending stands for.
     """
-    for mark, what, remedy in _KNOWN:
-        if begins_with.startswith(mark):
-            return ValueError(f"{path.name} is {what}, which is not read. {remedy}")
+    known = _stranger(begins_with, path)
+    if known is not None:
+        what, remedy = known
+        return ValueError(f"{path.name} is {what}, which is not read. {remedy}")
     if meant is not None:
         return ValueError(
             f"{path.name} must be a file of {meant}, by its ending; it begins with the bytes "

@@ -49,7 +49,7 @@ class UffFormat(AbstractFormat):
             )
         if about is not None:
             names = [head["id1"] for head in histories.values()]
-            remarks = about_from(_samples(file, path, about, heads[about]))
+            remarks = about_from(_samples(file, path, about, heads[about]), path)
         else:
             names, remarks = _names(list(histories.values())), {}
         places = dict(zip(names, histories, strict=True))

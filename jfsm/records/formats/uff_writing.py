@@ -39,9 +39,21 @@ def save_uff(path: Path, contents: Contents) -> None:
         _write_function(stream, ABOUT, "", 0, "", np.arange(float(remarks.size)), remarks)
 
 
-def about_from(codes: np.ndarray) -> Mapping[str, Any]:
-    """What a record said of itself, from the channel of character codes."""
-    return json.loads(bytes(codes.astype(np.uint8)).decode("ascii"))
+def about_from(codes: np.ndarray, path: Path) -> Mapping[str, Any]:
+    """What a record said of itself, from the channel of character codes.
+
+    Raises
+    ------
+    ValueError
+        If they are damaged.
+    """
+    try:
+        return json.loads("".join(chr(round(code)) for code in codes.tolist()))
+    except (ValueError, OverflowError) as error:
+        raise ValueError(
+            f"{path.name} must hold the remarks of the record that was written to it; they are damaged ({error}). Copy "
+            f"the file again."
+        ) from error
 
 
 def _header(about: Mapping[str, Any]) -> list[str]:

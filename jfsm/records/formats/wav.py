@@ -1,8 +1,9 @@
 """Sound files (WAV), as recorded by USB accelerometers, sound cards and analysers."""
 
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 from scipy.io import wavfile
@@ -47,10 +48,12 @@ class WavFormat(AbstractFormat):
             )
         else:
             notes.append("Numbers are as in the file, whose unit is not stated.")
+        notes += _of_strays(path)
         names = [f"channel {place}" for place in range(1, len(columns[0]) + 1)]
 
         def channel(name: str) -> np.ndarray:
-            column = np.asarray(columns[:, names.index(name)], dtype=np.float64)
+            with np.errstate(invalid="ignore"):  # what is no number becomes one that is refused
+                column = np.asarray(columns[:, names.index(name)], dtype=np.float64)
             if kind == "u1":
                 column -= 128.0  # eight bits have no sign
             return column / FULL_SCALE.get(kind, 1.0)
@@ -61,3 +64,18 @@ class WavFormat(AbstractFormat):
             clocks=Lazy(names, lambda name: np.arange(columns.shape[0]) / rate),
             notes=tuple(notes),
         )
+
+
+def _of_strays(path: Path) -> Iterator[str]:
+    """What stands behind the last chunk of the file that can be one, as where the length of the samples is damaged."""
+    whole = path.stat().st_size
+    with path.open("rb") as stream:
+        order: Literal["little", "big"] = "big" if stream.read(4) == b"RIFX" else "little"
+        place = 12
+        while place + 8 <= whole:
+            stream.seek(place)
+            name, size = stream.read(4), int.from_bytes(stream.read(4), order)
+            if not (name.isascii() and name.decode("ascii", "replace").isprintable()):
+                yield f"{whole - place} bytes from byte {place} on are no part of the sound; they are left out."
+                return
+            place += 8 + size + size % 2

@@ -72,29 +72,40 @@ def layout_of(file: TextFile) -> Layout:
     ValueError
         If no line looks like a row of numbers.
     """
-    sample: list[str] = []
-    count, has_comma, has_point, has_quote = 0, False, False, False
+    seen = _seen(file)
+    delimiter, rows = _vote(seen.sample, file.path)
+    numeric = _numeric(rows)
+    mixed = seen.has_quote if delimiter == "," else seen.has_comma and seen.has_point
+    if mixed or seen.has_quote:
+        marks = _marks_by_column(file, delimiter, len(numeric))
+    else:
+        marks = (_mark_by_default(seen, delimiter),) * len(numeric)
+    integers = not any(mark in field for row in rows for field in row for mark in ".,")
+    one_mark = len({mark for mark, used in zip(marks, numeric, strict=True) if used}) < 2
+    return Layout(delimiter, numeric, marks, one_mark and not mixed, seen.lines, integers)
+
+
+class _Seen(NamedTuple):
+    """Lines from all over a file, remarks and blank ones left out, how many it has, and what stands in any of them."""
+
+    sample: list[str]
+    lines: int
+    has_comma: bool
+    has_point: bool
+    has_quote: bool
+
+
+def _seen(file: TextFile) -> _Seen:
+    sample, lines, marks = list[str](), 0, set[str]()
     for _, block in file.blocks():
-        count += len(block)
+        lines += len(block)
         wanted = FIRST if not sample else PER_BLOCK
         step = max(1, len(block) // wanted) if sample else 1
         if len(sample) < MOST:
             sample += [line for line in block[: wanted * step : step] if line.strip() and not is_comment(line)]
         text = "".join(block)
-        has_comma, has_point, has_quote = has_comma or "," in text, has_point or "." in text, has_quote or '"' in text
-    delimiter, rows = _vote(sample, file.path)
-    numeric = _numeric(rows)
-    by_default: Mark = "," if delimiter != "," and has_comma and not has_point else "."
-    mixed = has_quote if delimiter == "," else has_comma and has_point
-    columns = _fields_by_column(file, delimiter, len(numeric)) if mixed or has_quote else None
-    marks: tuple[Mark, ...] = (
-        tuple(_mark(columns, place, delimiter) for place in range(len(numeric)))
-        if columns is not None
-        else (by_default,) * len(numeric)
-    )
-    integers = not any(mark in field for row in rows for field in row for mark in ".,")
-    one_mark = len({mark for mark, used in zip(marks, numeric, strict=True) if used}) < 2
-    return Layout(delimiter, numeric, marks, one_mark and not mixed, count, integers)
+        marks |= {mark for mark in ',."' if mark not in marks and mark in text}
+    return _Seen(sample, lines, "," in marks, "." in marks, '"' in marks)
 
 
 def _vote(sample: Sequence[str], path: Path) -> tuple[str | None, list[list[str]]]:
@@ -163,10 +174,20 @@ def _fields_by_column(file: TextFile, delimiter: str | None, width: int) -> list
     return telling
 
 
-def _mark(columns: list[dict[str, None]], place: int, delimiter: str | None) -> Mark:
-    fields = [field for field in columns[place] if is_number(field)]
-    by_default: Mark = "," if delimiter != "," and fields and all("," in field for field in fields) else "."
-    return decimal_mark(fields, by_default)
+def _marks_by_column(file: TextFile, delimiter: str | None, width: int) -> tuple[Mark, ...]:
+    """The decimal mark of each column, by its fields from all over the file."""
+
+    def mark(telling: dict[str, None]) -> Mark:
+        fields = [field for field in telling if is_number(field)]
+        by_default: Mark = "," if delimiter != "," and fields and all("," in field for field in fields) else "."
+        return decimal_mark(fields, by_default)
+
+    return tuple(mark(telling) for telling in _fields_by_column(file, delimiter, width))
+
+
+def _mark_by_default(seen: _Seen, delimiter: str | None) -> Mark:
+    """The decimal mark of a file without quotes in which commas and points do not meet."""
+    return "," if delimiter != "," and seen.has_comma and not seen.has_point else "."
 
 
 def values_of(fields: Sequence[str], layout: Layout) -> Iterator[float | None]:
