@@ -217,7 +217,8 @@ def test_a_factor_is_told_by_few_periods_whose_lines_lie_close_to_the_mode(rate,
     rng, t = np.random.default_rng(18), np.arange(2000) / rate
     force = 20.0 * sosfilt(butter(4, upto, fs=rate, output="sos"), rng.standard_normal(t.size))
     k = 900.0 if rate > 100 else 250.0
-    _, y, _ = lsim(([[0.0, 1.0], [-k, -1.0]], [[0.0], [1.0]], [[1.0, 0.0], [-k, -1.0]], [[0.0], [1.0]]), force, t)
+    system = [[0.0, 1.0], [-k, -1.0]], [[0.0], [1.0]], [[1.0, 0.0], [-k, -1.0]], [[0.0], [1.0]]
+    y = np.asarray(lsim(system, force, t)[1])
     shown = {"acceleration": factor * y[:, 1]} if factor < 1 else {"displacement": factor * y[:, 0]}
     record = jfsm.Record(t, force=force, **{kind: noisy(each, 3) for kind, each in shown.items()})
     with pytest.raises(ValueError, match=words):
