@@ -215,7 +215,7 @@ def test_a_diagnosis_refuses_a_dead_channel_by_name():
 )
 def test_a_factor_is_told_by_few_periods_whose_lines_lie_close_to_the_mode(rate, upto, factor, words):
     rng, t = np.random.default_rng(18), np.arange(2000) / rate
-    force = 20.0 * sosfilt(butter(4, upto, fs=rate, output="sos"), rng.standard_normal(t.size))
+    force = 20.0 * np.asarray(sosfilt(butter(4, upto, fs=rate, output="sos"), rng.standard_normal(t.size)))
     k = 900.0 if rate > 100 else 250.0
     system = [[0.0, 1.0], [-k, -1.0]], [[0.0], [1.0]], [[1.0, 0.0], [-k, -1.0]], [[0.0], [1.0]]
     y = np.asarray(lsim(system, force, t)[1])
