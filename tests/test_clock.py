@@ -232,6 +232,8 @@ def test_a_force_that_is_late_by_some_samples_is_a_cause():
     (finding,) = d.findings
     assert finding.cause in ("force_delay", "channel_delay")
     assert abs(finding.parameters["tau"].value) == pytest.approx(2.5 * STEP, rel=0.02)
+    (rival,) = finding.rivals
+    assert {finding.at, rival.at} == {("force", 1), ("displacement", 1)} and "is the same" in d.sentence
 
 
 def test_the_verdict_on_a_late_force_follows_from_what_it_changes():

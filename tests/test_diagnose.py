@@ -458,6 +458,12 @@ def test_where_no_law_fits_those_are_fitted_too_that_explain_less_of_the_missing
     assert [f.cause for f in d.findings] == ["cubic_hardening"]
 
 
+def test_friction_that_is_smaller_at_rest_does_not_fall_with_speed():
+    law = jfsm.causes()["stribeck"].effect
+    assert "does not fall" in law(3.0, 2.7, 0.1, at=(0, 1)).otherwise(9.0)
+    assert law(3.0, 3.1, 0.1, at=(0, 1)).otherwise(9.0) == ""
+
+
 @pytest.mark.parametrize("cause", ["stribeck", "lugre"])
 def test_friction_that_is_gone_at_speed_is_another_law(cause):
     numbers = {p.name: 1.0 for p in jfsm.causes()[cause].effect.parameters}

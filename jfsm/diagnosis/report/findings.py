@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...identification import Nuisances, Unknown
-from ...structures import PARAMETER_CAUSES, Clipping, Structure, is_offset
-from .._diagnosis import CandidateResult, Finding, Rival
+from ...reporting import place_name
+from ...structures import PARAMETER_CAUSES, ChannelDelay, Clipping, ForceDelay, Structure, is_offset
+from .._diagnosis import FOUND, CandidateResult, Finding, Rival
 from ..advice.next_test import RIVAL
 from ..channels.clipping import clipped_channel
 from ..evidence.between_records import differences
@@ -88,20 +89,36 @@ def _finding(
     shares = ranked.shares(kind, effect.at)
     members = {cause: share for cause, share in shares.items() if share >= RIVAL or cause == effect.cause.id}
     likely = [m for m in ranked.members(kind, effect.at) if m.cause in members]
+    rivals = _rivals(effect, ranked.decision, winner, list(ranked.trials.values()))
+    sentence, other = effect.cause.sentence, _the_same_delay(effect, nuisances)
+    if other is not None:
+        sentence += f"; where one response is measured, a delay at {place_name(other.at)} is the same"
+        rivals += () if (other.cause, other.at) in [(rival.cause, rival.at) for rival in rivals] else (other,)
     return Finding(
         cause=effect.cause.id,
         family=effect.cause.family,
         at=effect.at,
         probability=probability,
         parameters=effect_values(winner, which, model, units),
-        rivals=_rivals(effect, ranked.decision, winner, list(ranked.trials.values())),
-        sentence=effect.cause.sentence,
+        rivals=rivals,
+        sentence=sentence,
         kind=kind,
         kind_probability=kind_probability,
         law_open=probability < THRESHOLDS.class_named or winner.key in ranked.decision.near,
         members=members,
         size=size_of_class(kind, likely, model, missing, nuisances.record.dt, units),
     )
+
+
+def _the_same_delay(effect: Effect, nuisances: Nuisances) -> Rival | None:
+    """The delay that shows as the one of an effect does: of one force and one response either may be late."""
+    delays = {ForceDelay: "channel_delay", ChannelDelay: "force_delay"}
+    forces = [channel for channel in nuisances.record.channels if channel[0] == "force"]
+    both = [*forces, *nuisances.record.responses]
+    if effect.cause.effect not in delays or len(forces) != 1 or len(both) != 2:
+        return None
+    (other,) = (channel for channel in both if channel != effect.at)
+    return Rival(delays[effect.cause.effect], other, 1 - FOUND)
 
 
 def _narrowest_sure(effect: EffectCard, ranked: Ranked) -> tuple[str, float]:

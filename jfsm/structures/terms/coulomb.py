@@ -74,6 +74,8 @@ class Stribeck(AbstractFriction):
         return -size, size
 
     def otherwise(self, stiffness):
+        if self.F_static < self.F:
+            return "it does not fall with speed: the static friction is the smaller one"
         return gone_at_speed(self.F, self.F_static)
 
     @classmethod
