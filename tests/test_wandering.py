@@ -68,3 +68,12 @@ def test_of_few_periods_what_a_law_makes_is_not_taken_for_a_zero():
     d = jfsm.diagnose(record, RIGHT, causes=FEW, key=jax.random.key(0))
     assert not any("wanders" in note for note in d.notes)
     assert [f.cause for f in d.findings] == ["cubic_hardening"]
+
+
+def test_a_creep_of_three_noise_levels_in_a_decay_is_no_cause():
+    t = np.arange(2700) * 0.001
+    x = 0.02 * np.exp(-3.0 * t) * np.cos(np.sqrt(3000.0 - 9.0) * t) + 3.5e-6 * t
+    record = jfsm.Record(t, displacement=x + 3e-6 * np.random.default_rng(14).standard_normal(t.size))
+    causes = ("parametric_stiffness", "quadratic_stiffness", "bilinear_damping")
+    d = jfsm.diagnose(record, jfsm.Structure.sdof(1.0, 3000.0, 6.0), causes=causes, key=jax.random.key(0))
+    assert d.verdict == "consistent" and any("zero of displacement 1 wanders" in note for note in d.notes)

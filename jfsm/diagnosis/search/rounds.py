@@ -80,7 +80,8 @@ class Rounds:
         if self._limit.over:
             return singles, None
         best = self._likeliest(singles.every)
-        other = self._with_other_times(singles.every) or self._with_other_noise(best)
+        explains = best if explained(best, refitted) >= THRESHOLDS.half else refitted
+        other = self._with_other_times(singles.every) or self._with_other_noise(explains)
         effects = self._second_effects(singles) if self.pairs and other is None else []
         if not effects:
             return singles, other
@@ -191,7 +192,8 @@ class Rounds:
         return None
 
     def _with_other_noise(self, best: Trial) -> Problem | None:
-        """The problem with the noise that a channel turns out to have beside the best; None where none has."""
+        """The problem with the noise that a channel turns out to have beside the best that explains something; None
+        where none has."""
         other = coloured(best, self.problem)  # noise that remembers is in part slow as well
         if other is not None:
             return other
