@@ -2,14 +2,15 @@
 
     python benchmarks/replay.py PATH … [--where TEXT] [--with NAME=VALUE …] [--without CHECK …]
     python benchmarks/replay.py PATH … --record before.json; edit the code; the same with --against before.json
-    python benchmarks/replay.py PATH … --sensitivity --checks
+    python benchmarks/replay.py PATH … --sensitivity --checks --calibration
 
 A `PATH` is a folder of cards (of `benchmarks/blind.py --cards`, `benchmarks/cards.py`), a card, or what
 `jfsm diagnose --json` wrote, of which no truth is known. Verdicts are compared with those that were recorded; after
 `--record`, with those of the code before a change. With `--sensitivity` every threshold is moved by a fifth, down and
 up, and the verdicts that change are counted in a hundred: those that were right before and those that are right then;
-with `--checks` every check is left out by itself, as if all passed it. A card that lacks what another verdict asks is
-named as not measured, one that this version cannot read is named and left out.
+with `--checks` every check is left out by itself, as if all passed it. With `--calibration` laws and classes that were
+named are counted by the probability that they were given, and how many were right. A card that lacks what another
+verdict asks is named as not measured, one that this version cannot read is named and left out.
 """
 
 import argparse
@@ -25,16 +26,24 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from unittest import mock
 
+import jax
+
+jax.config.update("jax_enable_x64", True)
+
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from benchmarks.blind_table import exact  # noqa: E402  (needs the line above when run as a script)
+import jfsm  # noqa: E402  (needs the line above when run as a script)
+from benchmarks.blind_table import exact  # noqa: E402
 from jfsm.diagnosis.evidence.evidence import Evidence, NotMeasuredError  # noqa: E402
+from jfsm.diagnosis.evidence.scorecard import Scorecard  # noqa: E402
+from jfsm.diagnosis.hypotheses.law_classes import SENSOR, classes_of  # noqa: E402
 from jfsm.diagnosis.thresholds import THRESHOLDS, Thresholds  # noqa: E402
 from jfsm.diagnosis.verdict import bench, confirmed  # noqa: E402
 from jfsm.diagnosis.verdict import judge as protocol  # noqa: E402
 from jfsm.diagnosis.verdict.checks import CHECKS, Check, checked  # noqa: E402
+from jfsm.diagnosis.verdict.claims import narrowest_sure  # noqa: E402
 from jfsm.diagnosis.verdict.decision import Decision  # noqa: E402
-from jfsm.diagnosis.verdict.judge import judge  # noqa: E402
+from jfsm.diagnosis.verdict.judge import evidence_behind, judge  # noqa: E402
 
 MOVED = (0.8, 1.2)
 NOT_MEASURED = "not measured"
@@ -209,6 +218,7 @@ def arguments() -> argparse.ArgumentParser:
     parser.add_argument("--where", default="", metavar="TEXT", help="cards with this in their name, or `imposed`")
     parser.add_argument("--sensitivity", action="store_true", help="move each threshold by a fifth")
     parser.add_argument("--checks", action="store_true", help="leave out each check by itself")
+    parser.add_argument("--calibration", action="store_true", help="how often what was named is right")
     parser.add_argument("--without", nargs="+", default=[], choices=list(CHECKS), metavar="CHECK")
     parser.add_argument("--with", dest="moved", nargs="+", default=[], metavar="NAME=VALUE", help="other thresholds")
     parser.add_argument("--record", type=Path, metavar="FILE", help="keep the verdicts here, to compare later ones")
@@ -241,6 +251,44 @@ def compare(cards: Sequence[Card], limits: Thresholds) -> None:
     print(f"{len(cards)} cards, {sum(known)} of {len(known)} right as recorded; {dict(counts)}")
 
 
+BANDS = (0.0, 0.5, 0.8, 0.95, 1.0)
+"""Of probability, among which what was named is counted."""
+
+
+def calibration(cards: Sequence[Card], limits: Thresholds) -> None:
+    """How often laws and classes that were named are right, by the probability that they were given."""
+    laws, classes = list[tuple[float, bool]](), list[tuple[float, bool]]()
+    for card in cards:
+        found = judged(card, limits) if "cause" in card.truth and not card.truth.get("outside") else None
+        if found is None or found.verdict != "cause":
+            continue
+        behind = evidence_behind(found, card.evidence).cards
+        drawn = [card.truth, *([card.truth["beside"]] if card.truth.get("beside") else [])]
+        truths = [truth["cause"] for truth in drawn]
+        true_classes = set().union(*(classes_of_truth(truth, behind) for truth in drawn))
+        for effect in behind[found.winner].effects:
+            mine = [key for key, other in behind.items() if effect in other.effects]
+            laws.append((sum(map(found.probability, mine)), effect.cause in truths))
+            kind, chance = narrowest_sure(effect, found, behind, limits)
+            classes.append((chance, kind in true_classes))
+    print(f"{'probability':12s} {'laws':>6s} right  {'classes':>8s} right")
+    for low, high in itertools.pairwise(BANDS):
+        rows = [[right for chance, right in named if low < chance <= high] for named in (laws, classes)]
+        shares = [f"{sum(row) / len(row):6.1%}" if row else "     -" for row in rows]
+        print(f"{low:.2f} to {high:.2f} {len(rows[0]):6d} {shares[0]} {len(rows[1]):8d} {shares[1]}")
+
+
+def classes_of_truth(truth: Mapping[str, Any], cards: Mapping[str, Scorecard]) -> set[str]:
+    """The classes of a hidden cause: with the numbers that were fitted, or of a motion of unit size where none were."""
+    name, known = truth["cause"], jfsm.causes()
+    fitted = {kind for card in cards.values() for one in card.effects if one.cause == name for kind in one.classes}
+    if fitted or name not in known:
+        return fitted
+    if known[name].is_sensor:
+        return {SENSOR}
+    return set(classes_of(known[name], known[name].term(at=tuple(truth["at"]), **truth["parameters"]), 1.0, 1.0))
+
+
 def main() -> None:
     parser = arguments()
     given, begin = parser.parse_args(), time.perf_counter()
@@ -256,6 +304,8 @@ def main() -> None:
         sensitivity(cards)
     if given.checks:
         ablation(cards)
+    if given.calibration:
+        calibration(cards, limits)
     print(f"{time.perf_counter() - begin:.1f} s")
 
 

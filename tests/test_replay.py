@@ -69,6 +69,14 @@ def test_a_change_is_compared_with_the_code_before_it(folder, tmp_path, monkeypa
     assert f"new.json: not in {kept}" in replayed(monkeypatch, capsys, folder, "--against", kept)
 
 
+def test_named_laws_and_classes_are_counted_by_their_probability(folder, monkeypatch, capsys):
+    other = json.loads((folder / "card.json").read_text())
+    other["truth"] = {"cause": "cubic_hardening", "at": [0, 1], "parameters": {"k3": 2.0}}
+    (folder / "other.json").write_text(json.dumps(other))
+    told = replayed(monkeypatch, capsys, folder, "--calibration")
+    assert "0.95 to 1.00      3  66.7%        3  66.7%" in told  # the diagnosis has no truth
+
+
 def test_what_was_not_measured_is_named(folder, monkeypatch, capsys):
     told = replayed(monkeypatch, capsys, folder, "--with", "named=1.1", "class_named=1.1")
     assert "moved: not measured" in told and "'not measured': 1" in told

@@ -15,9 +15,10 @@ from ..channels.clipping import clipped_channel
 from ..evidence.between_records import differences
 from ..evidence.fitted import Trial
 from ..evidence.missing_force import Residual
-from ..evidence.scorecard import EffectCard, Scorecard
+from ..evidence.scorecard import Scorecard
 from ..hypotheses.effect import Effect, key_of, names, places
 from ..thresholds import THRESHOLDS
+from ..verdict.claims import narrowest_sure
 from ..verdict.decision import Decision
 from .class_size import Member, size_of_class
 from .estimates import Units, all_effect_values, effect_values, estimate
@@ -38,11 +39,6 @@ class Ranked(NamedTuple):
             for which, effect in enumerate(card.effects)
             if effect.at == at and kind in effect.classes and self.decision.probability_of_class(key) > 0
         ]
-
-    def probability(self, kind: str, at: tuple) -> float:
-        """Probability that something of a class acts at a place."""
-        chances = {m.trial.key: m.probability for m in self.members(kind, at)}
-        return sum(chances.values())
 
     def shares(self, kind: str, at: tuple) -> dict[str, float]:
         """Probability of every cause of a class at a place, the most probable first; with that of a law of some other
@@ -83,13 +79,13 @@ def _finding(
     which: int, ranked: Ranked, winner: Trial, model: Structure, missing: Residual, nuisances: Nuisances
 ) -> Finding:
     """One effect of the winner; its rivals are the effects that may take its place, the winner's others aside."""
-    effect, units = winner.effects[which], nuisances.record.units
+    effect, units, decision = winner.effects[which], nuisances.record.units, ranked.decision
     probability = ranked.probability_of_effect(effect)
-    kind, kind_probability = _narrowest_sure(ranked.cards[winner.key].effects[which], ranked)
+    kind, kind_probability = narrowest_sure(ranked.cards[winner.key].effects[which], decision, ranked.cards)
     shares = ranked.shares(kind, effect.at)
     members = {cause: share for cause, share in shares.items() if share >= RIVAL or cause == effect.cause.id}
     likely = [m for m in ranked.members(kind, effect.at) if m.cause in members]
-    rivals = _rivals(effect, ranked.decision, winner, list(ranked.trials.values()))
+    rivals = _rivals(effect, decision, winner, list(ranked.trials.values()))
     sentence, other = effect.cause.sentence, _the_same_delay(effect, nuisances)
     if other is not None:
         sentence += f"; where one response is measured, a delay at {place_name(other.at)} is the same"
@@ -104,7 +100,7 @@ def _finding(
         sentence=sentence,
         kind=kind,
         kind_probability=kind_probability,
-        law_open=probability < THRESHOLDS.class_named or winner.key in ranked.decision.near,
+        law_open=probability < THRESHOLDS.class_named or winner.key in decision.near,
         members=members,
         size=size_of_class(kind, likely, model, missing, nuisances.record.dt, units),
     )
@@ -119,14 +115,6 @@ def _the_same_delay(effect: Effect, nuisances: Nuisances) -> Rival | None:
         return None
     (other,) = (channel for channel in both if channel != effect.at)
     return Rival(delays[effect.cause.effect], other, 1 - FOUND)
-
-
-def _narrowest_sure(effect: EffectCard, ranked: Ranked) -> tuple[str, float]:
-    """The narrowest class of an effect that is sure, with its probability; the likeliest of its classes if none is."""
-    chances = {kind: ranked.probability(kind, effect.at) for kind in effect.classes}
-    sure = (kind for kind, chance in chances.items() if chance >= THRESHOLDS.class_named)
-    kind = next(sure, max(chances, key=lambda kind: chances[kind]))
-    return kind, chances[kind]
 
 
 def _rivals(effect: Effect, decision: Decision, winner: Trial, trials: Sequence[Trial]) -> tuple[Rival, ...]:

@@ -1,11 +1,13 @@
 """Claims that a law, or a class of laws, acts at a place, and which alternatives hold them."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from ...reporting import place_name
 from ..evidence.scorecard import EffectCard, Scorecard
 from ..hypotheses.law_classes import NARROWEST_FIRST
+from ..thresholds import THRESHOLDS, Thresholds
+from .decision import Decision
 
 Claim = tuple[tuple[tuple, str], ...]
 """Places, each with the class of what acts there."""
@@ -36,6 +38,25 @@ def shares_a_class(card: Scorecard, winner: Scorecard) -> bool:
     """Whether any effects of two alternatives are of one class."""
     classes = {name for effect in winner.effects for name in effect.classes}
     return any(not classes.isdisjoint(effect.classes) for effect in card.effects)
+
+
+def chance(kind: str, at: tuple, decision: Decision, cards: Mapping[str, Scorecard]) -> float:
+    """Probability that something of a class acts at a place."""
+    return sum(
+        decision.probability_of_class(key)
+        for key, card in cards.items()
+        if any(effect.at == at and kind in effect.classes for effect in card.effects)
+    )
+
+
+def narrowest_sure(
+    effect: EffectCard, decision: Decision, cards: Mapping[str, Scorecard], limits: Thresholds = THRESHOLDS
+) -> tuple[str, float]:
+    """The narrowest class of an effect that is sure, with its probability; the likeliest of its classes if none is."""
+    chances = {kind: chance(kind, effect.at, decision, cards) for kind in effect.classes}
+    sure = (kind for kind, found in chances.items() if found >= limits.class_named)
+    kind = next(sure, max(chances, key=lambda kind: chances[kind]))
+    return kind, chances[kind]
 
 
 def words(claim: Claim) -> str:
