@@ -136,7 +136,7 @@ VERDICTS = (
         "no",
         "yes",
         "wrong, or a map does better",
-        "nearly all is closed",
+        "half is closed",
         "",
         "cause, its class; the law is open",
     ),

@@ -17,11 +17,11 @@ def chain(between: list[float], ground: float) -> np.ndarray:
     return np.array([[first + second, -second], [-second, second + ground]])
 
 
-def record(spring: float, dashpot: float) -> jfsm.Record:
+def record(spring: float, dashpot: float, springs: list[float] = SPRINGS) -> jfsm.Record:
     """Readings of the chain pushed at its end by a force that is straight between samples."""
     rng, dt, n = np.random.default_rng(4), 0.01, 900
     inverse = np.diag(1.0 / MASS)
-    k, c = chain(SPRINGS, spring), chain(DASHPOTS, dashpot)
+    k, c = chain(springs, spring), chain(DASHPOTS, dashpot)
     a = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ k, -inverse @ c]])
     b = np.vstack([np.zeros((2, 1)), inverse[:, 1:]])
     rows = np.vstack([a[2:], np.eye(4)[:2]]), np.vstack([inverse[:, 1:], np.zeros((2, 1))])
@@ -69,3 +69,9 @@ def test_a_fit_with_every_link_misses_none():
     found = jfsm.fit(jfsm.Structure.chain(MASS, SPRINGS, DASHPOTS) + jfsm.LinearStiffness(150.0, at=(0, 2)),
                      record(150.0, 0.0))  # fmt: skip
     assert found.missing == ""
+
+
+def test_a_model_without_any_spring_is_fitted_too():
+    dashpots = [jfsm.LinearDamping(c, at=at) for c, at in zip(DASHPOTS, [(0, 1), (1, 2)], strict=True)]
+    found = jfsm.fit(jfsm.Structure(MASS, dashpots), record(0.0, 0.0, [0.0, 0.0]))
+    assert found.values["damping@1-2.c"] == pytest.approx(DASHPOTS[1], rel=0.1) and not found.missing

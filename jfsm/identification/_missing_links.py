@@ -62,7 +62,8 @@ def missing_links(posterior: Posterior, theta: np.ndarray, lane: int) -> list[Mi
         structure.sensors,
         structure.trust,
     )
-    scale = max(float(t.k) for t in structure.terms if isinstance(t, LinearStiffness))
+    natural = max(map(float, structure.mass)) * posterior.records[0].omega ** 2
+    scale = max((float(t.k) for t in structure.terms if isinstance(t, LinearStiffness)), default=natural)
     springs = tuple(
         Unknown(f"{LinearStiffness.kind}@{i}-{j}.k", 0.0, scale, False, 0.0, 1.0, low=-1.0, high=1.0) for i, j in pairs
     )

@@ -22,6 +22,10 @@ from ._unknowns import Unknown, values_of
 
 LANES = 2
 """Starts that climb side by side where nothing sticks."""
+_TELL_COLOUR = 2048
+"""Samples of a record that tell the colour of its noise."""
+_CLOSE = 1e-6
+"""Change of its log-likelihood, as a share, that is none."""
 _KNOWN_START, _HIDDEN_START = 1e-6, 0.3
 """Doubt about the initial state, and about hidden states there, as shares of the motion's size."""
 
@@ -216,7 +220,8 @@ class Posterior:
     def colour(self, theta: Float[np.ndarray, " unknowns"], channels: Sequence[int], loudest: float) -> Colour:
         """The most likely colour of the noise of these channels at `theta` (unknowns,) of a hypothesis with one start.
 
-        It is the same in all records. The noise of the force is up to `loudest` times as strong as it was taken to be.
+        It is the same in all records, of each of which so many samples tell it. The noise of the force is up to
+        `loudest` times as strong as it was taken to be.
         """
         quiet, picked, powers = self.at_the_floor(theta), list(channels), []
         for index, end in enumerate(self.until):
@@ -229,14 +234,16 @@ class Posterior:
             return sum(value for value, _ in found), np.sum([slope for _, slope in found], 0)
 
         begin = Colour.begin(np.mean(powers, 0))
-        found = minimize(cost, begin, jac=True, method="L-BFGS-B", bounds=Colour.reach(begin, loudest))
+        found = minimize(
+            cost, begin, jac=True, method="L-BFGS-B", bounds=Colour.reach(begin, loudest), options={"ftol": _CLOSE}
+        )
         return Colour.of(found.x, channels)
 
     def _slope_by_colour(
         self, theta: np.ndarray, index: int, values: np.ndarray, channels: Sequence[int]
     ) -> tuple[float, np.ndarray]:
         """Minus log-likelihood of a record at `theta`, and its gradient by the values of its noise's colour."""
-        nuisances, until = self.records[index], self.until[index]
+        nuisances, until = self.records[index], min(self.until[index], _TELL_COLOUR)
         use = np.asarray(nuisances.readings.use)[:until]
 
         def run(lanes: np.ndarray) -> Innovations:

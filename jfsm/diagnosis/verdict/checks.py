@@ -285,12 +285,12 @@ CHECKS: Mapping[str, Kind] = {
         "may close it, else it is half as sure.",
         ("half",),
     ),
-    "closes_nearly_all": Kind(
+    "class_closes_half": Kind(
         "confirmed",
         ">=",
         "share of held-out error",
-        "A law that is not quite of the right shape closes nearly all of the held-out error; its class is named then.",
-        ("nearly_all",),
+        "A law that is not of the right shape closes half of the held-out error; its class is named then.",
+        ("half",),
     ),
 }
 """In the order of the stages."""

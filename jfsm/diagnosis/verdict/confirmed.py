@@ -50,16 +50,16 @@ def confirm(decision: Decision, evidence: Evidence, limits: Thresholds, *, long_
 
 def _of_its_class(decision: Decision, hearing: "_Hearing") -> Decision | None:
     """The decision with the first of the laws that are near named that runs over held-out readings confirm."""
-    bench, least = hearing.bench, hearing.bench.limits.nearly_all
+    bench, least = hearing.bench, hearing.bench.limits.half
     for near in decision.near[:MOST_NEAR]:
         errors = bench.evidence.held_out(near)
         if errors is None:
             return None
         says = (
-            f"closes {errors.closed:.0%} of the error on held-out readings; {least:.0%} are needed of a law not quite "
-            "right"
+            f"closes {errors.closed:.0%} of the error on held-out readings; {least:.0%} are needed of a law of the right "
+            "class alone"
         )
-        if bench.check("closes_nearly_all", near, errors.closed, least, says).passed:
+        if bench.check("class_closes_half", near, errors.closed, least, says).passed:
             reasons = {**decision.reasons, near: _NEAR}
             return replace(decision, verdict="cause", winner=near, reasons=reasons, stopped_by=None)
     return None

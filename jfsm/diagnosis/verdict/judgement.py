@@ -159,6 +159,7 @@ class _Judgement:
         row = bench.check("explains_nearly_all", winner.key, share, limits.nearly_all, says)
         if not row.passed:
             bench.stop(row)
+            self._name_its_class(winner)
         return bool(row.passed)
 
     def _refit_explains_enough(self) -> bool:
@@ -191,7 +192,7 @@ class _Judgement:
         return ("unnamed", bench.refitted) if self._map_stands_for_all() else ("undecided", winner)
 
     def _name_its_class(self, winner: Scorecard) -> None:
-        """Beside a map that does better, a class of laws that is sure."""
+        """Beside a map that does better, or where much is left, a class of laws that is sure."""
         if is_sure_of(winner, self.bench):
             self.near = nearest(winner, self.bench)
 

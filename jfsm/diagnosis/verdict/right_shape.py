@@ -119,7 +119,7 @@ def nearest(winner: Scorecard, bench: Bench) -> tuple[str, ...]:
     """
     if bench.white(winner):
         return ()
-    least = bench.limits.nearly_all if len(winner.effects) == 1 else bench.limits.almost_all
+    least = bench.limits.half if len(winner.effects) == 1 else bench.limits.almost_all
     kin = [card for card in (winner, *_alike(winner, bench)) if bench.explained(card) >= least]
     if not kin:
         return ()
