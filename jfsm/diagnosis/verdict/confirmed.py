@@ -56,8 +56,8 @@ def _of_its_class(decision: Decision, hearing: "_Hearing") -> Decision | None:
         if errors is None:
             return None
         says = (
-            f"closes {errors.closed:.0%} of the error on held-out readings; {least:.0%} are needed of a law of the right "
-            "class alone"
+            f"closes {errors.closed:.0%} of the error on held-out readings; {least:.0%} are needed of a law of the "
+            "right class alone"
         )
         if bench.check("class_closes_half", near, errors.closed, least, says).passed:
             reasons = {**decision.reasons, near: _NEAR}
