@@ -145,9 +145,10 @@ class Study:
         return candidates(self.model, [steadied(n) for n in problem.records], chosen, self.places)
 
     def _lags(self, late: Studied, problem: Problem, given: Trial, refitted: Trial) -> bool:
-        """Whether a law by which the structure lags is likelier than a late force, beside which nothing was found."""
-        best = max(late[2].every, key=lambda t: t.evidence)
-        if best.effects or self.limit.over:
+        """Whether a law by which the structure lags is likelier than a late force beside the model, whatever was found
+        beside that: it leaves noise alone already."""
+        best = max(late[2].given, late[2].refitted, key=lambda t: t.evidence)
+        if self.limit.over:
             return False
         lagging = [c for c in self._candidates(problem) if c.starts and c.effects[0].cause.effect in _LAGGING]
         if not lagging:
