@@ -946,3 +946,9 @@ def test_what_one_effect_explains_is_not_lost_with_a_second_that_these_records_c
     decision = judged(single, pair)
     assert outcome(decision) == outcome_is
     assert decision.reasons[pair.key] == "changes with time, in a decay"
+
+
+def test_that_a_class_acts_does_not_say_that_it_is_all():
+    decision = judged(card(9000.0, 0.002, "coulomb"))
+    assert decision.verdict == "cause" and decision.explained[FRICTION] < 1.0
+    assert decision.probability(FRICTION) < decision.probability_of_class(FRICTION)

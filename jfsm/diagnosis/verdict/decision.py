@@ -14,7 +14,9 @@ MODEL = "model"
 
 
 SHAPE = "other shapes would gain beside it"
-"""Name of the factor that doubts the shape of a law, and says nothing against its class."""
+EXPLAINED = "share of the excess that"
+"""Names of the factors, or what they begin with, that doubt the shape of a law, and that it is all: neither speaks
+against its class."""
 
 
 class Factor(NamedTuple):
@@ -83,8 +85,10 @@ class Decision:
         return product_of(self.factors.get(key, ()))
 
     def probability_of_class(self, key: str) -> float:
-        """Probability that a hypothesis adds to those of its classes: whether its shape is right does not matter."""
-        return product_of([factor for factor in self.factors.get(key, ()) if factor.name != SHAPE])
+        """Probability that a hypothesis adds to those of its classes: that something of them acts says neither that its
+        shape is right nor that it is all."""
+        every = self.factors.get(key, ())
+        return product_of([factor for factor in every if not factor.name.startswith((SHAPE, EXPLAINED))])
 
     def less_sure(self, name: str, size: float = 0.5) -> "Decision":
         """The decision less sure of every cause, half as sure by default."""

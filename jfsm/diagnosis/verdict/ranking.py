@@ -12,6 +12,7 @@ from ..thresholds import THRESHOLDS, Thresholds
 from .admissible import is_possible
 from .bench import Bench
 from .claims import Claim, alike, claims_of, holds, shares_a_class, words
+from .decision import EXPLAINED
 
 TRACE = "is a trace: laws of other classes gain about as much, where the refitted model leaves nothing"
 
@@ -74,7 +75,7 @@ def is_sure_of(winner: Scorecard, bench: Bench) -> bool:
     likely = {claim: _probability_of(claim, bench) for claim in claims_of(winner)}
     if not bench.noise_only(winner):
         # The rest may be the work of another law than the catalogue's: no name is surer than what it explains.
-        name = f"share of the excess that {winner.label} explains"
+        name = f"{EXPLAINED} {winner.label} explains"
         bench.less_sure(list(bench.factors), name, bench.explained(winner))
     probability, limits = bench.probability(winner.key), bench.limits
     says = f"has a probability of {probability:.0%}; {limits.named:.0%} are needed"
