@@ -22,8 +22,8 @@ from ._unknowns import Unknown, values_of
 
 LANES = 2
 """Starts that climb side by side where nothing sticks."""
-_TELL_COLOUR = 2048
-"""Samples of a record that tell the colour of its noise."""
+_COLOUR_SAMPLES = 2048
+"""Samples of a record, its first, from which the colour of its noise is estimated."""
 _CLOSE = 1e-6
 """Change of its log-likelihood, as a share, that is none."""
 _KNOWN_START, _HIDDEN_START = 1e-6, 0.3
@@ -220,7 +220,7 @@ class Posterior:
     def colour(self, theta: Float[np.ndarray, " unknowns"], channels: Sequence[int], loudest: float) -> Colour:
         """The most likely colour of the noise of these channels at `theta` (unknowns,) of a hypothesis with one start.
 
-        It is the same in all records, of each of which so many samples tell it. The noise of the force is up to
+        It is the same in all records, and estimated from the first samples of each. The noise of the force is up to
         `loudest` times as strong as it was taken to be.
         """
         quiet, picked, powers = self.at_the_floor(theta), list(channels), []
@@ -243,7 +243,7 @@ class Posterior:
         self, theta: np.ndarray, index: int, values: np.ndarray, channels: Sequence[int]
     ) -> tuple[float, np.ndarray]:
         """Minus log-likelihood of a record at `theta`, and its gradient by the values of its noise's colour."""
-        nuisances, until = self.records[index], min(self.until[index], _TELL_COLOUR)
+        nuisances, until = self.records[index], min(self.until[index], _COLOUR_SAMPLES)
         use = np.asarray(nuisances.readings.use)[:until]
 
         def run(lanes: np.ndarray) -> Innovations:

@@ -259,7 +259,7 @@ def whiteness(posterior: Posterior, theta: np.ndarray) -> float:
 
 def lane_left(posterior: Posterior, theta: np.ndarray, lane: int) -> float:
     """Error power that the prediction of one lane leaves, in those of the signal, over all sets."""
-    return float(np.sum(predict(_alone_in(posterior, lane), theta[lane]).error))
+    return predict(_alone_in(posterior, lane), theta[lane]).power
 
 
 def _alone_in(posterior: Posterior, lane: int) -> Posterior:

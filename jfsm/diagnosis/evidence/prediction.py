@@ -32,6 +32,11 @@ class Prediction:
         """Power beyond noise and `chance` standard deviations of it, per set."""
         return np.maximum(self.error - self.expected - chance * self.scatter, 0.0)
 
+    @property
+    def power(self) -> float:
+        """Error power over all sets, in those of the signal."""
+        return float(np.sum(self.error))
+
     def left(self, chance: float = THRESHOLDS.chance) -> float:
         """What is left beyond noise and chance, as a share of the signal; of the worst set."""
         return math.sqrt(float(np.max(self.beyond(chance))))

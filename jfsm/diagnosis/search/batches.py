@@ -257,7 +257,7 @@ def best_of_each(trials: Sequence[Trial]) -> list[Trial]:
 
 def _better(one: Trial, other: Trial) -> Trial:
     """The one that predicts, where the other does not; else the more probable one."""
-    left, rest = (float(np.sum(t.prediction.error)) for t in (one, other))
+    left, rest = one.prediction.power, other.prediction.power
     if max(left, rest) > _BLIND * min(left, rest):
         return one if left < rest else other
     return one if one.evidence > other.evidence else other

@@ -4,8 +4,6 @@ import math
 from collections.abc import Sequence
 from itertools import chain
 
-import numpy as np
-
 from ...structures import AbstractSensor, AbstractTerm, Structure
 from ..evidence.excess import explained, is_noise_only
 from ..evidence.fitted import Trial
@@ -142,7 +140,7 @@ def _in_the_running(found: Sequence[Trial]) -> list[Trial]:
 
 def _leaders(found: Sequence[Trial]) -> list[Trial]:
     """Of trials in the order of their evidence the most probable, and those that predict best."""
-    return [*found[:_AGAIN], *sorted(found, key=lambda t: float(np.sum(t.prediction.error)))[:_AGAIN]]
+    return [*found[:_AGAIN], *sorted(found, key=lambda t: t.prediction.power)[:_AGAIN]]
 
 
 def search_known(found: Trial, others: Found, problem: Problem, tell: Tell) -> Found:
