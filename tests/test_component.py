@@ -262,7 +262,7 @@ def test_the_command_line_is_told_that_the_motion_drives(tmp_path):
     assert written.drive == "motion" and written.force is not None
     assert np.allclose(written.force[:, 0], LINEAR, atol=1e-4)
     result = CliRunner().invoke(app, [str(w) for w in [*words, "--drive", "both"]])
-    assert result.exit_code == 2 and "`drive` must be" in result.output
+    assert result.exit_code == 2 and "--drive must be" in result.output
 
 
 @pytest.mark.parametrize(
