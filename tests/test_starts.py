@@ -167,7 +167,7 @@ def test_what_comes_to_rest_is_judged_while_it_moves():
     assert np.mean(np.abs(v) < 1e-3) > 0.5
     (found,) = place(law, missing_force(MODEL, prepared), MODEL, scale_of(prepared, MODEL), prepared)
     assert found.share is not None and found.share > 0.7
-    assert float(found.term.values[0]) == pytest.approx(0.4, rel=0.2)
+    assert float(found.term.values[0]) == pytest.approx(0.4, rel=0.3)  # smoothing rounds its jumps
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -184,6 +184,49 @@ def test_the_missing_force_of_a_decay_fades_with_it(seed: int):
     power = np.mean(x**6)
     assert np.mean((latent.force[:, 0] - x**3) ** 2) < 0.15 * power
     assert np.mean(latent.force[time > 45.0, 0] ** 2) < 1e-4 * power
+
+
+def test_the_missing_force_is_known_between_coarse_samples_too():
+    time = np.arange(1500) * 0.15
+    phases = np.random.default_rng(1).uniform(0.0, 6.28, 12)
+    tones = np.linspace(0.5, 7.0, 12)
+
+    def drive(t):
+        return 2.0 * np.cos(np.multiply.outer(t, tones) + phases).sum(-1)
+
+    def rate(t, y):
+        return [y[1], drive(t) - 9.0 * y[0] - 0.3 * y[1] - 2.0 * y[0] ** 3]
+
+    x, v = solve_ivp(rate, (0, time[-1]), [0.0, 0.0], t_eval=time, rtol=1e-8, atol=1e-10).y
+    a = drive(time) - 9.0 * x - 0.3 * v - 2.0 * x**3
+    noise = 0.01 * np.random.default_rng(2).standard_normal((2, time.size))
+    r = jfsm.Record(time, force=drive(time), displacement=x + noise[0], acceleration=a + 9 * noise[1])
+    model = jfsm.Structure.sdof(1.0, 9.0, 0.3)
+    latent = missing_force(model, prepare(r, model))
+    assert np.std(latent.force[:, 0] - 2.0 * x**3) < 0.08 * np.std(2.0 * x**3)
+
+
+def test_of_several_masses_the_missing_force_is_where_a_law_acts():
+    time, n = np.arange(1500) * 0.02, 3
+    tones, phases = np.linspace(1.0, 20.0, 15), np.random.default_rng(3).uniform(0.0, 6.28, 15)
+    k, c = np.array([900.0, 700.0, 500.0]), np.array([0.8, 0.6, 0.5])
+
+    def motion(t, y):
+        stretch, speed = np.diff(np.r_[0.0, y[:n]]), np.diff(np.r_[0.0, y[n:]])
+        inner = k * stretch + c * speed + np.array([0.0, 0.0, 1e5]) * stretch**3
+        push = np.array([0.0, 5.0 * np.cos(tones * t + phases).sum(), 0.0])
+        return np.r_[y[n:], np.append(inner[1:], 0.0) - inner + push]
+
+    y = solve_ivp(motion, (0, time[-1]), np.zeros(2 * n), t_eval=time, rtol=1e-8, atol=1e-10).y
+    a = np.stack([motion(t, one)[n:] for t, one in zip(time, y.T, strict=True)], 1)
+    a += 0.01 * np.std(a) * np.random.default_rng(4).standard_normal(a.shape)
+    push = 5.0 * np.cos(np.multiply.outer(time, tones) + phases).sum(1)
+    r = jfsm.Record(time, force={2: push}, acceleration={j + 1: a[j] for j in range(n)}, at_rest=True)
+    model = jfsm.Structure.chain(mass=np.ones(n), stiffness=k, damping=c)
+    latent, true = missing_force(model, prepare(r, model)), 1e5 * (y[2] - y[1]) ** 3
+    assert np.std(latent.force[:, 2] - true) < 0.2 * np.std(true)
+    assert np.std(latent.force[:, 1] + true) < 0.2 * np.std(true)
+    assert np.std(latent.force[:, 0]) < 0.1 * np.std(true)
 
 
 def test_regression_cannot_tell_a_constant_force_from_an_offset():

@@ -3,11 +3,14 @@ r"""The force that a model lacks, as a hidden state: Kalman filter and Rauch-Tun
     M ẍ + C ẋ + K x + r = g,     ṙ = -r/τ + w,
 
 r is an Ornstein-Uhlenbeck process per degree of freedom, its amplitude and its memory τ chosen by likelihood among a
-few, and whether it swells and fades with the motion, as in a decay. Whatever the model says of nonlinear terms is
+few, and whether it swells and fades with the motion, as in a decay. Of several masses each has an amplitude of its own:
+a law acts on two of them, and the others tell where these are. Whatever the model says of nonlinear terms is
 inside r, and is taken off afterwards. This is for pictures and maps, not for the likelihood of a hypothesis.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -28,6 +31,10 @@ _AMPLITUDES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 """Its amplitude, as a share of the elastic force."""
 _SWELL = (1, 2)
 """Powers of the motion's energy that the latent force's power may follow: of linear laws and of steeper ones."""
+_TOLD_APART = 5
+"""Steps that tell the amplitudes on several masses apart, at most,"""
+_OTHER_MEMORIES = (0.5, 1.0, 2.0, 4.0)
+"""and memories that are tried in each, in those of the step before."""
 _WIDE = 10.0
 _CERTAIN = 5.0
 """Velocity, in its standard errors, from which something moves."""
@@ -52,6 +59,21 @@ class Latent:
     force: Float[np.ndarray, "n dof"]
     std: Float[np.ndarray, "n dof"]
     moves: Bool[np.ndarray, " n"]
+
+
+class _Belief(NamedTuple):
+    """Memory [s] of the missing force, and its amplitude on each mass, as an acceleration."""
+
+    memory: float
+    amplitude: Float[np.ndarray, " dof"]
+
+    def after(
+        self, force: Float[np.ndarray, "n dof"], std: Float[np.ndarray, "n dof"], plant: Plant
+    ) -> Iterator["_Belief"]:
+        """With the amplitudes at which the smoothed force is likelier (a step of expectation maximisation), and this
+        memory, shorter and longer ones."""
+        amplitude = np.sqrt(np.mean(force**2 + std**2, 0)) / np.diag(np.asarray(plant.mass))
+        yield from (_Belief(factor * self.memory, amplitude) for factor in _OTHER_MEMORIES)
 
 
 class _Model(NamedTuple):
@@ -99,42 +121,43 @@ def latent_force(
     seen, use = _on_time(plant, seen, use, dt)
     acceleration = np.array([kind == "acceleration" for kind in observation.kinds])
     seen = seen - base[:, :1] * acceleration
-    models = [
-        _model(
-            plant,
-            observation,
-            dt,
-            inputs.substeps,
-            tau / omega,
-            share * omega**2 * length,
-            np.asarray(force_covariance),
-            np.asarray(variance),
-            omega,
-            length,
-        )
-        for tau, share in product(_MEMORIES, _AMPLITUDES)
-    ]
-    stacked = jax.tree.map(lambda *leaves: np.stack(leaves), *models)
+    arrays = np.asarray(force_covariance), np.asarray(variance), omega, length
+    make = partial(_model, plant, observation, dt, inputs.substeps, *arrays)
+    even = np.full(plant.dof, omega**2 * length)
+    beliefs = [_Belief(tau / omega, share * even) for tau, share in product(_MEMORIES, _AMPLITUDES)]
     data = (true, seen, use)
     dof = plant.dof
     period = max(int(2 * np.pi / (omega * dt)), 1)
 
-    def most_likely(swell: np.ndarray) -> tuple[float, _Model, np.ndarray]:
+    def most_likely(beliefs: list[_Belief], swell: np.ndarray) -> tuple[float, _Belief, np.ndarray]:
+        models = [make(*belief) for belief in beliefs]
+        stacked = jax.tree.map(lambda *leaves: np.stack(leaves), *models)
         likelihoods = np.asarray(_likelihoods(stacked, *data, swell))
         best = int(np.nanargmax(likelihoods))
-        return float(likelihoods[best]), models[best], swell
+        return float(likelihoods[best]), beliefs[best], swell
 
-    _, model, swell = even = most_likely(np.ones(padded))
-    mean, _ = (np.asarray(out) for out in _smooth(model, *data, swell))
+    def motion(belief: _Belief, swell: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        mean, std = _smooth(make(*belief), *data, swell)
+        return np.asarray(mean), np.asarray(std)
+
+    best = most_likely(beliefs, np.ones(padded))
+    mean, std = motion(*best[1:])
     energy = np.mean(mean[:n, :dof] ** 2 + (mean[:n, dof : 2 * dof] / omega) ** 2, 1)
     energy = gaussian_filter1d(energy, period, mode="nearest")
     swelling = [
-        most_likely(np.pad(swell_of(energy**power), (0, padded - n), mode="edge"))
+        most_likely(beliefs, np.pad(swell_of(energy**power), (0, padded - n), mode="edge"))
         for power in _SWELL
         if np.any(energy > 0)
     ]
-    _, model, swell = max(even, *swelling, key=lambda found: found[0])
-    mean, std = (np.asarray(out) for out in _smooth(model, *data, swell))
+    best = max(best, *swelling, key=lambda found: found[0])
+    mean, std = motion(*best[1:])
+    for _ in range(_TOLD_APART if dof > 1 else 0):
+        _, belief, swell = best
+        found = most_likely(list(belief.after(mean[:n, 2 * dof :], std[:n, 2 * dof :], plant)), swell)
+        if not found[0] > best[0]:
+            break
+        best = found
+        mean, std = motion(*best[1:])
     x, v, r = mean[:, :dof], mean[:, dof : 2 * dof], mean[:, 2 * dof :]
     known = (
         np.asarray(force_along(plant, jnp.asarray(x), jnp.asarray(v), inputs.time[:padded]))
@@ -159,7 +182,7 @@ def _on_time(plant: Plant, seen: np.ndarray, use: np.ndarray, dt: float) -> tupl
 
 
 def _model(
-    plant: Plant, observation: Observation, dt, substeps, tau, amplitude, force_covariance, variance, omega, length
+    plant: Plant, observation: Observation, dt, substeps, force_covariance, variance, omega, length, tau, amplitude
 ) -> _Model:
     dof = plant.dof
     minv = np.linalg.inv(np.asarray(plant.mass))
@@ -182,8 +205,7 @@ def _model(
     mass = np.diag(np.asarray(plant.mass))
     noise = np.zeros((n, n))
     noise[dof : 2 * dof, dof : 2 * dof] = minv @ (force_covariance * dt**2) @ minv.T
-    wander = np.zeros((n, n))
-    wander[2 * dof :, 2 * dof :] = np.diag((amplitude * mass) ** 2 * -np.expm1(-2 * dt / tau))
+    wander = _accumulated(rate, np.diag(np.concatenate([np.zeros(2 * dof), 2 / tau * (amplitude * mass) ** 2])), dt)
     row = {
         "displacement": np.hstack([eye, zero, zero]),
         "velocity": np.hstack([zero, eye, zero]),
@@ -199,6 +221,16 @@ def _model(
     arrays: Any = step, noise, rows, variance, start, wander  # of NumPy, to go to the device together
     drive: Any = carried, through
     return _Model(LinearModel(*arrays), *drive)
+
+
+def _accumulated(
+    rate: Float[np.ndarray, "state state"], white: Float[np.ndarray, "state state"], dt: float
+) -> Float[np.ndarray, "state state"]:
+    """Covariance that white noise of this intensity leaves after a step (Van Loan 1978, IEEE TAC 23, 395)."""
+    n = len(rate)
+    both = scipy.linalg.expm(np.block([[-rate, white], [np.zeros((n, n)), rate.T]]) * dt)
+    found = both[n:, n:].T @ both[:n, n:]
+    return (found + found.T) / 2
 
 
 def _driven(model: _Model, force, values):

@@ -5,6 +5,7 @@ regressed beside every shape of the other, which takes no more than their inner 
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,8 @@ from jaxtyping import Float, Shaped
 from ..estimation import Latent
 from ..structures import AbstractTerm, Scale, Structure
 from ._nuisances import Nuisances
-from ._starts import CORRELATED, Regression, of_size, one_sign, shapes_of
+from ._regression import CORRELATED, Regression, of_size, one_sign
+from ._starts import shapes_of
 
 _APART = 1e-3
 """Share of a shape's power that another does not make, below which the two are one."""
@@ -31,12 +33,16 @@ class PlacedTogether(NamedTuple):
 
 
 class _Shapes(NamedTuple):
-    """Forces (shapes, samples) of a law, and which signs (shapes,) their sizes may have: 0 is either."""
+    """Forces of a law along its link, and which signs their sizes may have: 0 is either."""
 
-    law: AbstractTerm
+    regression: Regression
     rows: list[dict[str, float]]
     forces: Float[np.ndarray, "shapes samples"]
     signs: Shaped[np.ndarray, " shapes"]
+
+    @property
+    def law(self) -> AbstractTerm:
+        return self.regression.law
 
     def sized(self, k: int, size: float) -> AbstractTerm:
         """The term of a shape and its size."""
@@ -60,29 +66,24 @@ def place_together(
     `signs` asks for that sign of the first number of a law, unless it is 0. Pairs of which no shapes do are left out.
     """
     shapes: dict[int, _Shapes] = {}
-    regression = None
     for i, (law, sign) in enumerate(zip(laws, signs, strict=True)):
         regression = Regression.of(law, latent, structure, nuisances, ())
         if regression is None:
             return []
+        every = -(-regression.missing.size // _ENOUGH)
         forces, rows = regression.columns(shapes_of(law, scale, sides=True))
         if rows and not regression.linear(forces):
-            shapes[i] = _Shapes(law, rows, forces, _signs(law, rows, sign))
+            shapes[i] = _Shapes(regression.every(every), rows, forces[:, ::every], _signs(law, rows, sign))
     pairs = [pair for pair in pairs if shapes.keys() >= set(pair)]
-    if regression is None or not pairs:
-        return []
-    samples, dof = regression.missing.shape
-    every = -(-samples * dof // _ENOUGH)
-    kept = np.repeat(np.arange(samples) % every == 0, dof)
-    basis, wanted = regression.basis[kept], regression.wanted[kept]
-    shapes = {i: one._replace(forces=one.forces[:, kept]) for i, one in shapes.items()}
-    found = _explaining(shapes, pairs, basis, wanted, np.zeros((0, basis.shape[1])))
+    found = _explaining(shapes, pairs)
     if not found:
         return []
     # What else may be off is not so far off that it would take the place of a law: as for laws placed by themselves.
-    rest = max(1.0 - max(one.share for one in found), 1e-12) * float(np.mean(wanted**2))
-    ridge = np.diag(np.sqrt(CORRELATED / every * rest) / regression.doubt)
-    return sorted(_explaining(shapes, pairs, basis, wanted, ridge), key=lambda one: -one.share)
+    some = next(iter(shapes.values())).regression
+    rest = max(1.0 - max(one.share for one in found), 1e-12) * float(np.mean(some.wanted**2))
+    ridge = np.sqrt(CORRELATED / every * rest) / some.doubt
+    doubted = {i: one._replace(regression=replace(one.regression, ridge=ridge)) for i, one in shapes.items()}
+    return sorted(_explaining(doubted, pairs), key=lambda one: -one.share)
 
 
 def _signs(law: AbstractTerm, rows: list[dict[str, float]], sign: int) -> np.ndarray:
@@ -93,37 +94,44 @@ def _signs(law: AbstractTerm, rows: list[dict[str, float]], sign: int) -> np.nda
     return np.array([sign * np.sign(next(iter(row.values()))) for row in rows])
 
 
-def _explaining(
-    shapes: dict[int, _Shapes],
-    pairs: Sequence[tuple[int, int]],
-    basis: np.ndarray,
-    wanted: np.ndarray,
-    ridge: np.ndarray,
-) -> list[PlacedTogether]:
-    q = np.linalg.qr(np.vstack([basis, ridge]))[0]
+class _Outside(NamedTuple):
+    """Forces of a law and their inner products outside of what else may be off: what of them that makes, their powers,
+    and their products with the missing force."""
 
-    def outside(rows: np.ndarray) -> np.ndarray:
-        padded = np.pad(rows, ((0, 0), (0, len(ridge))))
-        return padded - (padded @ q) @ q.T
+    shapes: _Shapes
+    taken: Float[np.ndarray, "shapes told"]
+    power: Float[np.ndarray, " shapes"]
+    wanted: Float[np.ndarray, " shapes"]
 
-    [wanted] = outside(wanted[None])
-    total = float(wanted @ wanted)
-    beside = {i: one._replace(forces=outside(one.forces)) for i, one in shapes.items()}
+
+def _explaining(shapes: dict[int, _Shapes], pairs: Sequence[tuple[int, int]]) -> list[PlacedTogether]:
+    if not pairs:
+        return []
+    some = next(iter(shapes.values())).regression
+    outside = some.outside()
+    total, missing = some.missing_of(outside)
+    beside = {i: _outside(one, outside, missing) for i, one in shapes.items()}
     found = []
     for pair in pairs:
         one, other = (beside[i] for i in pair)
-        k, m, sizes, gain = _best(one, other, wanted)
+        k, m, sizes, gain = _best(one, other)
         if gain > 0:
-            terms = one.sized(k, sizes[0]), other.sized(m, sizes[1])
+            terms = one.shapes.sized(k, sizes[0]), other.shapes.sized(m, sizes[1])
             found.append(PlacedTogether(pair, terms, gain / total))
     return found
 
 
-def _best(one: _Shapes, other: _Shapes, wanted: np.ndarray) -> tuple[int, int, tuple[float, float], float]:
+def _outside(shapes: _Shapes, outside: np.ndarray, missing: np.ndarray) -> _Outside:
+    moments = shapes.regression.moments(shapes.forces)
+    taken = moments.off @ outside
+    return _Outside(shapes, taken, moments.power - np.sum(taken**2, 1), moments.wanted - taken @ missing)
+
+
+def _best(one: _Outside, other: _Outside) -> tuple[int, int, tuple[float, float], float]:
     """Which shape of either explains most of what is wanted, with what sizes, and how much of its square."""
-    cross = one.forces @ other.forces.T
-    powers = np.sum(one.forces**2, 1)[:, None], np.sum(other.forces**2, 1)[None, :]
-    alike = (one.forces @ wanted)[:, None], (other.forces @ wanted)[None, :]
+    meet = float(one.shapes.regression.along @ other.shapes.regression.along)
+    cross = meet * (one.shapes.forces @ other.shapes.forces.T) - one.taken @ other.taken.T
+    powers, alike = (one.power[:, None], other.power[None, :]), (one.wanted[:, None], other.wanted[None, :])
     determinant = powers[0] * powers[1] - cross**2
     apart = determinant > _APART * powers[0] * powers[1]
     determinant = np.where(apart, determinant, 1.0)
@@ -131,7 +139,7 @@ def _best(one: _Shapes, other: _Shapes, wanted: np.ndarray) -> tuple[int, int, t
         (alike[0] * powers[1] - alike[1] * cross) / determinant,
         (alike[1] * powers[0] - alike[0] * cross) / determinant,
     )
-    usable = apart & (one.signs[:, None] * sizes[0] >= 0) & (other.signs[None, :] * sizes[1] >= 0)
+    usable = apart & (one.shapes.signs[:, None] * sizes[0] >= 0) & (other.shapes.signs[None, :] * sizes[1] >= 0)
     gain = np.where(usable, sizes[0] * alike[0] + sizes[1] * alike[1], 0.0)
     k, m = np.unravel_index(np.argmax(gain), gain.shape)
     return int(k), int(m), (float(sizes[0][k, m]), float(sizes[1][k, m])), float(gain[k, m])

@@ -10,7 +10,7 @@ from ...identification import Nuisances, Unknown, settle
 from ...plant import Channel, InterpolatedInput, Reconstruction
 from ...structures import ForceDelay, Structure
 from ..evidence.excess import explained, is_noise_only
-from ..evidence.fitted import Trial, trial
+from ..evidence.fitted import Trial, standardised, trial
 from ..evidence.identifiable import single_line
 from ..evidence.setup import Problem
 from ..thresholds import THRESHOLDS
@@ -24,6 +24,8 @@ _USUAL, _FARTHEST = 0.5, 1.0
 """Samples by which a force is late as a rule, and at most: one that is later is a candidate like any other."""
 _WORTH_A_FIT = 0.8
 """Share of the most nats that some time of the force promises, from which another one is fitted too."""
+_OF_THE_MISFIT = 0.5
+"""Share of what a trial leaves beyond its noise that a time of the force has to promise: it is to explain nearly all."""
 
 
 class _Way(NamedTuple):
@@ -91,8 +93,16 @@ def _worth_a_fit(beside: Trial, problem: Problem, behind: float) -> list[_Way]:
     if not problem.ways or not _forces(beside.structure, problem.first) or single_line(problem.records) is not None:
         return []
     ways = [way for name in problem.ways for way in _promises(beside, problem, name)]
-    least = max(behind + THRESHOLDS.searched, _WORTH_A_FIT * max((way.promise for way in ways), default=0.0))
+    most = max((way.promise for way in ways), default=0.0)
+    least = max(behind + THRESHOLDS.searched, _WORTH_A_FIT * most, _OF_THE_MISFIT * _misfit(beside, problem))
     return [way for way in ways if way.promise >= least]
+
+
+def _misfit(beside: Trial, problem: Problem) -> float:
+    """Nats by which the innovations of a trial exceed what its noise makes."""
+    posterior = problem.posterior_of(beside)
+    every = (standardised(posterior, beside.theta, index) for index in range(len(problem.records)))
+    return sum(0.5 * float(np.sum(r**2) - np.count_nonzero(r)) for r in every)
 
 
 def _forces(structure: Structure, nuisances: Nuisances) -> list[Channel]:
