@@ -25,7 +25,7 @@ _USUAL, _FARTHEST = 0.5, 1.0
 _WORTH_A_FIT = 0.8
 """Share of the most nats that some time of the force promises, from which another one is fitted too."""
 _OF_THE_MISFIT = 0.5
-"""Share of what a trial leaves beyond its noise that a time of the force has to promise: it is to explain nearly all."""
+"""Share of what a trial leaves beyond its noise that a time of the force has to promise: it shall explain all."""
 
 
 class _Way(NamedTuple):
