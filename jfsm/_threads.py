@@ -1,8 +1,10 @@
 """Work on all cores: a compiled program takes one, and threads give it the others."""
 
 import os
+import threading
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import Protocol, TypeVar
 
 Item = TypeVar("Item")
@@ -29,3 +31,32 @@ def compiled_once(items: Sequence[Runs]) -> tuple[list[Runs], list[Runs]]:
     """The first item of every program, and the others: what the first compile, the others find there."""
     first = {item.program: item for item in reversed(items)}
     return list(first.values()), [item for item in items if item is not first[item.program]]
+
+
+_lock = threading.Lock()
+_inside = 0
+_before = None
+
+
+@contextmanager
+def small_matrices() -> Iterator[None]:
+    """While this lasts, every call of BLAS takes one thread; for work on many matrices of a few rows.
+
+    Several threads that share one of those wait for each other longer than they work, up to a thousand times where the
+    other cores are busy. The number belongs to the process: it is put back when the last of several calls that overlap
+    has ended.
+    """
+    global _inside, _before
+    from threadpoolctl import threadpool_limits  # looks through all libraries that are loaded, some milliseconds
+
+    with _lock:
+        _inside += 1
+        if _inside == 1:
+            _before = threadpool_limits(1, user_api="blas")
+    try:
+        yield
+    finally:
+        with _lock:
+            _inside -= 1
+            if not _inside and _before is not None:
+                _before.restore_original_limits()

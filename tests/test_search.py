@@ -19,9 +19,10 @@ from jfsm.diagnosis.hypotheses.effect import Effect
 from jfsm.diagnosis.hypotheses.initial_values import Begin, Start, begun
 from jfsm.diagnosis.hypotheses.parametrisation import hypothesis
 from jfsm.diagnosis.hypotheses.placement import Laws
-from jfsm.diagnosis.search import batches
+from jfsm.diagnosis.search import batches, climbing, rounds
 from jfsm.diagnosis.search.baseline import fit_model, refit_from
-from jfsm.diagnosis.search.batches import Found, LeftBehind, groups
+from jfsm.diagnosis.search.batches import groups
+from jfsm.diagnosis.search.climbing import Found, LeftBehind
 from jfsm.diagnosis.search.pairs import crossed, instead, pairs
 from jfsm.diagnosis.search.related_laws import beside_a_spring, instead_of, late_instead, special_cases
 from jfsm.diagnosis.search.searches import (
@@ -456,8 +457,8 @@ def test_of_two_fits_of_a_law_the_more_probable_one_stands_unless_it_predicts_no
         error = np.full(2, power)
         return Fit(name, evidence, Prediction(error, error, error))
 
-    assert batches._better(fit("blind", 900.0, left[0]), fit("sees", 100.0, left[1])).name == named
-    assert batches._better(fit("sees", 100.0, left[1]), fit("blind", 900.0, left[0])).name == named
+    assert climbing._better(fit("blind", 900.0, left[0]), fit("sees", 100.0, left[1])).name == named
+    assert climbing._better(fit("sees", 100.0, left[1]), fit("blind", 900.0, left[0])).name == named
 
 
 @pytest.mark.parametrize("imposed", [True, False])
@@ -466,4 +467,63 @@ def test_along_an_imposed_motion_a_law_that_predicts_goes_on_behind_those_that_a
         return SimpleNamespace(best=best, left=left, imposed=imposed, behind=0.0)
 
     blind, sees = [batch(-1e4 - k, 0.4) for k in range(3)], batch(0.0, 0.01)
-    assert (sees in batches._near([*blind, sees], 2)) == imposed
+    assert (sees in climbing._near([*blind, sees], 2)) == imposed
+
+
+STAGES = batches.Schedule((0.3, 0.03), 10, 0.5)
+
+
+class Climber:
+    """A batch after a stage."""
+
+    def __init__(self, name: str, best: float, share: float = np.inf, leaves: float = 1.0):
+        self.candidates, self.best, self.share, self.leaves = (name,), best, share, leaves
+        self.samples, self.imposed, self.limit, self.behind = 1000, False, UNLIMITED, 0.0
+
+    def misfit(self, share: float) -> float:
+        return self.leaves
+
+
+def going_on(climbers: list[Climber], kept: tuple[str, ...] = ()) -> list[str]:
+    every: Any = climbers
+    staying: Any = [c for c in climbers if c.candidates[0] in kept]
+    return [c.candidates[0] for c in climbing._going_on(every, STAGES, 1, staying)]
+
+
+@pytest.mark.parametrize(("leaves", "count"), [(1.1, 4), (3.0, 15)], ids=["arrived", "on its way"])
+def test_once_a_leader_leaves_hardly_more_than_noise_those_far_behind_stay_behind(leaves: float, count: int):
+    climbers = [Climber("leader", 0.0, leaves=leaves), *(Climber(f"{k}", 1e4 + k) for k in range(30))]
+    assert len(going_on(climbers)) == count
+
+
+def test_a_law_that_is_kept_goes_on_far_behind_a_leader_that_has_arrived_and_a_sensor_does_not():
+    climbers = [Climber("leader", 0.0), *(Climber(f"{k}", 1e4 + k) for k in range(8))]
+    climbers += [Climber("law", 9e4, share=0.3), Climber("sensor", 9e4)]
+    on = going_on(climbers, kept=("law", "sensor"))
+    assert "law" in on and "sensor" not in on
+
+
+def test_a_start_that_is_hopeless_beside_another_of_the_same_candidates_does_not_go_on():
+    climbers = [Climber("leader", 0.0, leaves=9.0), Climber("law", 1e4), Climber("law", 1e5), Climber("other", 1e5)]
+    assert sorted(going_on(climbers)) == ["law", "leader", "other"]
+
+
+@pytest.mark.parametrize(("share", "fitted"), [(0.9, ["law here", "same law", "sensor"]), (0.3, None)])
+def test_where_a_law_explains_half_others_are_looked_for_at_its_place_only(monkeypatch, share: float, fitted):
+    kinds = causes()
+
+    def candidate(cause: str, at: tuple) -> Candidate:
+        return Candidate((Effect(kinds[cause], at),), (MODEL,))
+
+    others = {
+        "law here": candidate("coulomb", (0, 1)),
+        "law elsewhere": candidate("coulomb", (1, 2)),
+        "same law": candidate("cubic_hardening", (1, 2)),
+        "sensor": candidate("channel_delay", ("acceleration", 2)),
+    }
+    best = SimpleNamespace(
+        evidence=1.0, laws=(jfsm.CubicStiffness(1.0, at=(0, 1)),), effects=(Effect(kinds["cubic_hardening"], (0, 1)),)
+    )
+    monkeypatch.setattr(rounds, "explained", lambda trial, refitted: share)
+    found = rounds.Rounds._there(SimpleNamespace(refitted=None), [best], list(others.values()))  # type: ignore
+    assert [name for name, one in others.items() if one in found] == (fitted or list(others))

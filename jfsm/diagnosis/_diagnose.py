@@ -7,6 +7,7 @@ import jax
 
 from .._limit import Limit, ended_by_interrupt
 from .._programs import programs_kept
+from .._threads import small_matrices
 from .._types import require_x64
 from ..plant import Reconstruction
 from ..records import Record
@@ -40,6 +41,7 @@ _ROUNDS = 3
 
 
 @programs_kept()
+@small_matrices()
 def diagnose(
     record: Record | Sequence[Record],
     model: Structure,

@@ -84,6 +84,15 @@ class _Model(NamedTuple):
     through: Float[Array, "channels dof"]
 
 
+class _Likely(NamedTuple):
+    """The likeliest of some models, by its log-likelihood, and how its latent force swells and fades (n,)."""
+
+    likelihood: float
+    model: _Model
+    belief: _Belief
+    swell: Float[np.ndarray, " n"]
+
+
 def latent_force(
     plant: Plant,
     observation: Observation,
@@ -125,39 +134,39 @@ def latent_force(
     make = partial(_model, plant, observation, dt, inputs.substeps, *arrays)
     even = np.full(plant.dof, omega**2 * length)
     beliefs = [_Belief(tau / omega, share * even) for tau, share in product(_MEMORIES, _AMPLITUDES)]
+    models = [make(*belief) for belief in beliefs]
     data = (true, seen, use)
     dof = plant.dof
     period = max(int(2 * np.pi / (omega * dt)), 1)
 
-    def most_likely(beliefs: list[_Belief], swell: np.ndarray) -> tuple[float, _Belief, np.ndarray]:
-        models = [make(*belief) for belief in beliefs]
+    def most_likely(models: list[_Model], beliefs: list[_Belief], swell: np.ndarray) -> _Likely:
         stacked = jax.tree.map(lambda *leaves: np.stack(leaves), *models)
         likelihoods = np.asarray(_likelihoods(stacked, *data, swell))
         best = int(np.nanargmax(likelihoods))
-        return float(likelihoods[best]), beliefs[best], swell
+        return _Likely(float(likelihoods[best]), models[best], beliefs[best], swell)
 
-    def motion(belief: _Belief, swell: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        mean, std = _smooth(make(*belief), *data, swell)
+    def motion(one: _Likely) -> tuple[np.ndarray, np.ndarray]:
+        mean, std = _smooth(one.model, *data, one.swell)
         return np.asarray(mean), np.asarray(std)
 
-    best = most_likely(beliefs, np.ones(padded))
-    mean, std = motion(*best[1:])
+    best = most_likely(models, beliefs, np.ones(padded))
+    mean, std = motion(best)
     energy = np.mean(mean[:n, :dof] ** 2 + (mean[:n, dof : 2 * dof] / omega) ** 2, 1)
     energy = gaussian_filter1d(energy, period, mode="nearest")
     swelling = [
-        most_likely(beliefs, np.pad(swell_of(energy**power), (0, padded - n), mode="edge"))
+        most_likely(models, beliefs, np.pad(swell_of(energy**power), (0, padded - n), mode="edge"))
         for power in _SWELL
         if np.any(energy > 0)
     ]
-    best = max(best, *swelling, key=lambda found: found[0])
-    mean, std = motion(*best[1:])
+    best = max(best, *swelling, key=lambda found: found.likelihood)
+    mean, std = motion(best)
     for _ in range(_TOLD_APART if dof > 1 else 0):
-        _, belief, swell = best
-        found = most_likely(list(belief.after(mean[:n, 2 * dof :], std[:n, 2 * dof :], plant)), swell)
-        if not found[0] > best[0]:
+        others = list(best.belief.after(mean[:n, 2 * dof :], std[:n, 2 * dof :], plant))
+        found = most_likely([make(*belief) for belief in others], others, best.swell)
+        if not found.likelihood > best.likelihood:
             break
         best = found
-        mean, std = motion(*best[1:])
+        mean, std = motion(best)
     x, v, r = mean[:, :dof], mean[:, dof : 2 * dof], mean[:, 2 * dof :]
     known = (
         np.asarray(force_along(plant, jnp.asarray(x), jnp.asarray(v), inputs.time[:padded]))

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from .._programs import programs_kept
+from .._threads import small_matrices
 from .._types import require_x64
 from ..plant import check_pair, direction, lower
 from ..records import Record, mended
@@ -74,6 +75,7 @@ class Motion:
 
 
 @programs_kept()
+@small_matrices()
 def estimate_motion(
     record: Record, model: Structure | None = None, places: Sequence[tuple[int, int]] | None = None
 ) -> Motion:

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from .._programs import programs_kept
 from .._result import Result
-from .._threads import side_by_side
+from .._threads import side_by_side, small_matrices
 from .._types import require_x64
 from ..plant import Reconstruction
 from ..records import Record, mended
@@ -78,6 +78,7 @@ class Fit:
 
 
 @programs_kept()
+@small_matrices()
 def fit(
     model: Structure,
     record: Record | Sequence[Record],

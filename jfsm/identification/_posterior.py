@@ -1,7 +1,7 @@
 """A structure's posterior on one or several records: likelihood times what was known beforehand."""
 
 import math
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -121,12 +121,35 @@ class Posterior:
 
     def _value(self, theta: Float[np.ndarray, " unknowns"], lane: int, slack: float, first: bool) -> float:
         total = prior(self.hypothesis.unknowns[lane], theta)[0]
+        for seen, use in self._seen(theta, lane, slack, first):
+            total += value_and_slopes(lambda _, seen=seen: seen, np.zeros(0), use).value
+        return total
+
+    def misfit(
+        self, theta: Float[np.ndarray, " unknowns"], lane: int = 0, slack: float = 0.0, first: bool = False
+    ) -> float:
+        """Mean square of one lane's innovations in their standard deviations: 1 where a hypothesis holds; arguments as
+        of `evaluate`."""
+        total, count = 0.0, 0.0
+        for seen, use in self._seen(theta, lane, slack, first):
+            error, variance = np.asarray(seen.error)[0], np.asarray(seen.variance)[0]
+            total += float(np.sum(np.where(use > 0, error**2 / np.maximum(variance, 1e-300), 0.0)))
+            count += float(np.sum(use > 0))
+        return total / max(count, 1.0)
+
+    def _seen(
+        self, theta: Float[np.ndarray, " unknowns"], lane: int, slack: float, first: bool
+    ) -> Iterator[tuple[Innovations, Shaped[np.ndarray, "n channels"]]]:
+        """Innovations of one lane, record by record, and which of the readings count."""
         for index, nuisances in enumerate(self.records):
             until, forgiven = self._until(index, first), max(slack, nuisances.forgiven)
             seen = self._run(theta[None], index, lane, np.full(1, forgiven), until)
-            use = np.asarray(nuisances.readings.use)[:until]
-            total += value_and_slopes(lambda _, seen=seen: seen, np.zeros(0), use).value
-        return total
+            yield seen, np.asarray(nuisances.readings.use)[:until]
+
+    @property
+    def leading(self) -> int:
+        """Samples of all records that lead to a basin."""
+        return sum(self._until(index, first=True) for index in range(len(self.records)))
 
     def _until(self, index: int, first: bool) -> int:
         """How many samples of a record count."""

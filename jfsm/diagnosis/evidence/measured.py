@@ -15,7 +15,7 @@ from ..channels.clock import Lateness, late_channels, lateness
 from ..channels.delays import Late, showing_late
 from ..hypotheses.effect import key_of
 from ..nats import many
-from ..search.batches import LeftBehind
+from ..search.climbing import LeftBehind
 from ..search.rounds import Searched
 from ..thresholds import THRESHOLDS
 from ..verdict.decision import Decision

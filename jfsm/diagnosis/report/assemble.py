@@ -23,7 +23,7 @@ from ..evidence.setup import Problem
 from ..hypotheses.candidate import Candidate
 from ..look.in_verdict import in_words, with_signs
 from ..look.looked import Looked
-from ..search.batches import LeftBehind
+from ..search.climbing import LeftBehind
 from ..verdict.decision import Decision
 from ..verdict.judge import after_looks, evidence_behind
 from .estimates import Units, modes_of_trial, noise_by_channel, plain_modes, refitted_values, smallest_effects, unit_of

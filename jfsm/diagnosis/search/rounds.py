@@ -23,7 +23,7 @@ from ..hypotheses.candidate import Candidate, as_promising, contained, elsewhere
 from ..hypotheses.effect import Effect
 from ..thresholds import THRESHOLDS
 from .baseline import refit_from
-from .batches import FAR_BEHIND, Found, LeftBehind, best_of_each
+from .climbing import FAR_BEHIND, Found, LeftBehind, best_of_each
 from .searches import search, search_akin, search_beside, search_known, search_pairs
 from .steps import Steps
 from .stopping import hidden, settled, something_left
@@ -141,10 +141,10 @@ class Rounds:
         slow: list[Candidate],
         others: list[Candidate],
     ) -> tuple[Found, list[Candidate]]:
-        """What else is fitted. Once the best leaves only noise, that is what may be as good; else all of it, since
-        regression may put the right law last if the missing force is poorly seen."""
+        """What else is fitted. Once the best leaves only noise, that is what may be as good; else all of it that may be
+        where the best is, since regression may put the right law last if the missing force is poorly seen."""
         if not settled(self._apart_from_the_drive([self.given, self.refitted, *found.trials]), self._lack):
-            return found, [c for c in others if c.starts] + slow
+            return found, self._there(found.trials, [*(c for c in others if c.starts), *slow])
         best = max(found.trials, key=lambda t: t.evidence)
         late, behind = self._not_far_behind(late, best)
         found = found.and_then(Found([], behind))
@@ -153,6 +153,15 @@ class Rounds:
         more += [c for c in dict.fromkeys(alike) if c not in more]
         likely = [*late, *as_promising(best.effects, self.every, stiff, least=1.0)]
         return found, more + [c for c in slow if c in likely]
+
+    def _there(self, trials: Sequence[Trial], others: list[Candidate]) -> list[Candidate]:
+        """Where the likeliest law explains half, no other law elsewhere."""
+        best = max(trials, key=lambda t: t.evidence)
+        if not best.laws or explained(best, self.refitted) < THRESHOLDS.half:
+            return others
+        places = {law.at for law in best.laws}
+        same = elsewhere(best.effects, others)
+        return [c for c in others if c in same or c.effects[0].cause.is_sensor or c.effects[0].at in places]
 
     def _not_far_behind(self, late: Sequence[Candidate], best: Trial) -> tuple[list[Candidate], list[LeftBehind]]:
         """Which channels that may be late could come near the best trial, and the others."""

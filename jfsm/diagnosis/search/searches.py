@@ -13,7 +13,8 @@ from ..hypotheses.candidate import Candidate
 from ..hypotheses.effect import Effect, families
 from ..hypotheses.initial_values import found_in, own_part
 from ..thresholds import THRESHOLDS
-from .batches import FROM_THERE, Found, Schedule, Tell, batches_of, climbed
+from .batches import FROM_THERE, Schedule, batches_of
+from .climbing import Found, Tell, climbed
 from .pairs import crossed, instead, joined, pairs, twins
 from .related_laws import beside_a_spring, instead_of, late_instead, resting, special_cases
 from .stopping import is_itself
