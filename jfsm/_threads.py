@@ -33,9 +33,7 @@ def compiled_once(items: Sequence[Runs]) -> tuple[list[Runs], list[Runs]]:
     return list(first.values()), [item for item in items if item is not first[item.program]]
 
 
-_lock = threading.Lock()
-_inside = 0
-_before = None
+_one_each = False
 
 
 @contextmanager
@@ -43,20 +41,18 @@ def small_matrices() -> Iterator[None]:
     """While this lasts, every call of BLAS takes one thread; for work on many matrices of a few rows.
 
     Several threads that share one of those wait for each other longer than they work, up to a thousand times where the
-    other cores are busy. The number belongs to the process: it is put back when the last of several calls that overlap
-    has ended.
+    other cores are busy. The number belongs to the process, and OpenBLAS raises it in the main thread only: calls in
+    other threads leave it.
     """
-    global _inside, _before
+    global _one_each
+    if _one_each or threading.current_thread() is not threading.main_thread():
+        yield
+        return
     from threadpoolctl import threadpool_limits  # looks through all libraries that are loaded, some milliseconds
 
-    with _lock:
-        _inside += 1
-        if _inside == 1:
-            _before = threadpool_limits(1, user_api="blas")
+    _one_each = True
     try:
-        yield
+        with threadpool_limits(1, user_api="blas"):
+            yield
     finally:
-        with _lock:
-            _inside -= 1
-            if not _inside and _before is not None:
-                _before.restore_original_limits()
+        _one_each = False

@@ -172,8 +172,9 @@ class Regression:
         left, missing = self.missing_of(outside)
         taken = moments.off @ outside
         power = np.maximum(moments.power - np.sum(taken**2, 1), 1e-300)
-        size = (moments.wanted - taken @ missing) / power
-        return left, size**2 * power, size, power, taken
+        alike = moments.wanted - taken @ missing
+        size = alike / power
+        return left, size * alike, size, power, taken
 
     def ranked(
         self, columns: Float[np.ndarray, "rows n"], rows: list[dict[str, float]], sign: int, scale: Scale
