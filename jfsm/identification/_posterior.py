@@ -24,6 +24,8 @@ LANES = 2
 """Starts that climb side by side where nothing sticks."""
 _COLOUR_SAMPLES = 2048
 """Samples of a record, its first, from which the colour of its noise is estimated."""
+_COLOUR_STEPS = 12
+"""Steps towards the likeliest colour, at most: where noise has one, half as many find it."""
 _CLOSE = 1e-6
 """Change of its log-likelihood, as a share, that is none."""
 _KNOWN_START, _HIDDEN_START = 1e-6, 0.3
@@ -258,7 +260,12 @@ class Posterior:
 
         begin = Colour.begin(np.mean(powers, 0))
         found = minimize(
-            cost, begin, jac=True, method="L-BFGS-B", bounds=Colour.reach(begin, loudest), options={"ftol": _CLOSE}
+            cost,
+            begin,
+            jac=True,
+            method="L-BFGS-B",
+            bounds=Colour.reach(begin, loudest),
+            options={"ftol": _CLOSE, "maxiter": _COLOUR_STEPS},
         )
         return Colour.of(found.x, channels)
 

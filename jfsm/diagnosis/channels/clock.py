@@ -10,11 +10,11 @@ from ...identification import Nuisances, Unknown, settle
 from ...plant import Channel, InterpolatedInput, Reconstruction
 from ...structures import ForceDelay, Structure
 from ..evidence.excess import explained, is_noise_only
-from ..evidence.fitted import Trial, standardised, trial
+from ..evidence.fitted import Trial, trial
 from ..evidence.identifiable import single_line
 from ..evidence.setup import Problem
 from ..thresholds import THRESHOLDS
-from .delays import likeliest_delay
+from .delays import OF_THE_MISFIT, likeliest_delay, misfit
 
 WAYS: tuple[Reconstruction, ...] = get_args(Reconstruction)
 """Of a force between its samples; what is filtered before it is sampled goes the first one."""
@@ -24,8 +24,6 @@ _USUAL, _FARTHEST = 0.5, 1.0
 """Samples by which a force is late as a rule, and at most: one that is later is a candidate like any other."""
 _WORTH_A_FIT = 0.8
 """Share of the most nats that some time of the force promises, from which another one is fitted too."""
-_OF_THE_MISFIT = 0.5
-"""Share of what a trial leaves beyond its noise that a time of the force has to promise: it shall explain all."""
 
 
 class _Way(NamedTuple):
@@ -94,15 +92,8 @@ def _worth_a_fit(beside: Trial, problem: Problem, behind: float) -> list[_Way]:
         return []
     ways = [way for name in problem.ways for way in _promises(beside, problem, name)]
     most = max((way.promise for way in ways), default=0.0)
-    least = max(behind + THRESHOLDS.searched, _WORTH_A_FIT * most, _OF_THE_MISFIT * _misfit(beside, problem))
+    least = max(behind + THRESHOLDS.searched, _WORTH_A_FIT * most, OF_THE_MISFIT * misfit(beside, problem))
     return [way for way in ways if way.promise >= least]
-
-
-def _misfit(beside: Trial, problem: Problem) -> float:
-    """Nats by which the innovations of a trial exceed what its noise makes."""
-    posterior = problem.posterior_of(beside)
-    every = (standardised(posterior, beside.theta, index) for index in range(len(problem.records)))
-    return sum(0.5 * float(np.sum(r**2) - np.count_nonzero(r)) for r in every)
 
 
 def _forces(structure: Structure, nuisances: Nuisances) -> list[Channel]:

@@ -3,6 +3,8 @@
 import math
 
 import numpy as np
+from scipy.linalg import solve_toeplitz
+from scipy.signal import lfilter
 
 from ...identification import Nuisances, Posterior
 from ...records import rolloff
@@ -19,6 +21,10 @@ _CORRELATED = 0.02
 """Power that correlations have in all, beyond chance, from which innovations are not those of noise,"""
 _CHANCE = 5.0
 """or so many of its standard deviations."""
+_ORDER = 3
+"""Samples that foretell the next innovation, where noise has a memory and is white in part;"""
+_STILL = 4.0
+"""and correlated power that may be left then, in that from which innovations are not those of noise."""
 _MOSTLY = 0.5
 """Share of a force's noise that is left where the structure moves, at least, where the force is not a few tones."""
 
@@ -34,7 +40,8 @@ def coloured(beside: Trial, problem: Problem) -> Problem | None:
         return None
     posterior = problem.posterior_of(beside)
     channels = _falling(posterior, beside.theta)
-    if not channels:
+    records = range(len(problem.records))
+    if not channels or not all(_uncorrelated(posterior, beside.theta, i, _ORDER, _STILL) for i in records):
         return None
     loudest = max(_loudest(n, end) for n, end in zip(problem.records, problem.until, strict=True))
     other = problem.with_colour(posterior.colour(beside.theta, channels, loudest))
@@ -67,8 +74,9 @@ def _loudest(nuisances: Nuisances, until: int) -> float:
     return most
 
 
-def _uncorrelated(posterior: Posterior, theta: np.ndarray, index: int) -> bool:
-    """Whether the innovations of every channel are uncorrelated over half a period, but for chance.
+def _uncorrelated(posterior: Posterior, theta: np.ndarray, index: int, order: int = 0, much: float = 1.0) -> bool:
+    """Whether the innovations of every channel are uncorrelated over half a period, but for so many times what counts
+    as chance; with an `order`, what is left of them once each is foretold from so many before.
 
     References
     ----------
@@ -76,9 +84,20 @@ def _uncorrelated(posterior: Posterior, theta: np.ndarray, index: int) -> bool:
     """
     nuisances, until, error = posterior.records[index], posterior.until[index], standardised(posterior, theta, index)
     lags = int(np.clip(nuisances.period / nuisances.record.dt / 2, *_LAGS))
+    if order:
+        error = np.column_stack([_unforeseen(one, order) for one in error.T])
     total = np.maximum(np.sum(error**2, 0), np.finfo(float).tiny)
     power = sum((np.sum(error[k:] * error[:-k], 0) / total) ** 2 for k in range(1, lags + 1)) - lags / until
-    return bool(np.all(power < max(_CORRELATED, _CHANCE * np.sqrt(2 * lags) / until)))
+    return bool(np.all(power < much * max(_CORRELATED, _CHANCE * np.sqrt(2 * lags) / until)))
+
+
+def _unforeseen(error: np.ndarray, order: int) -> np.ndarray:
+    """What the samples before do not foretell of each, by their correlations (Yule and Walker)."""
+    products = np.array([error[k:] @ error[: len(error) - k] for k in range(order + 1)])
+    if products[0] == 0:
+        return error
+    foretold = solve_toeplitz(products[:-1], products[1:])
+    return np.asarray(lfilter(np.concatenate([[1.0], -foretold]), [1.0], error))
 
 
 def memories(nuisances: Nuisances) -> list[str]:

@@ -9,7 +9,7 @@ import numpy as np
 from ...identification import Nuisances
 from ...records import Record, advanced
 from ...structures import ChannelDelay, ForceDelay, Structure
-from ..evidence.fitted import Trial, cost
+from ..evidence.fitted import Trial, cost, standardised
 from ..evidence.setup import Problem
 from ..evidence.split import HeldOut
 from ..thresholds import THRESHOLDS
@@ -17,6 +17,8 @@ from ..thresholds import THRESHOLDS
 _DELAYS = (ForceDelay, ChannelDelay)
 Late = Mapping[tuple[str, int], float]
 """How late channels are, by (kind, degree of freedom) [s]."""
+OF_THE_MISFIT = 0.5
+"""Share of what a trial leaves beyond its noise that another time of a channel has to promise: it shall explain all."""
 _STEP = 0.25
 """Samples by which a channel is read earlier and later."""
 _FARTHER = 4.0
@@ -52,9 +54,19 @@ def _in_time_evidence(best: Trial, trials: Sequence[Trial]) -> float:
 
 
 def seems_late(beside: Trial, problem: Problem) -> ChannelDelay | None:
-    """The delay, of less than a sample, of a channel that would make a trial without delays far likelier, if any."""
+    """The delay, of less than a sample, of a channel that would make a trial without delays far likelier, and explain
+    most of what it leaves, if any."""
     found = likeliest_delay(beside, problem)
-    return None if found is None or found[1] < THRESHOLDS.searched else found[0]
+    if found is None or found[1] < max(THRESHOLDS.searched, OF_THE_MISFIT * misfit(beside, problem)):
+        return None
+    return found[0]
+
+
+def misfit(beside: Trial, problem: Problem) -> float:
+    """Nats by which the innovations of a trial exceed what its noise makes."""
+    posterior = problem.posterior_of(beside)
+    every = (standardised(posterior, beside.theta, index) for index in range(len(problem.records)))
+    return sum(0.5 * float(np.sum(r**2) - np.count_nonzero(r)) for r in every)
 
 
 def likeliest_delay(beside: Trial, problem: Problem) -> tuple[ChannelDelay, float] | None:
