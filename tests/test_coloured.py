@@ -49,13 +49,13 @@ def test_a_force_that_no_law_makes_is_not_taken_for_noise():
     assert not said(d) and d.verdict != "consistent"
 
 
-def test_what_is_foretold_of_noise_with_a_memory_is_its_memory_and_of_a_rhythm_too_little():
+def test_what_is_foretold_of_noise_with_a_memory_is_its_memory_and_of_a_motion_too_little():
     def correlated(y: np.ndarray) -> float:
         return sum(float(y[k:] @ y[:-k] / (y @ y)) ** 2 for k in range(1, 21))
 
     rng = np.random.default_rng(5)
     sensor = lfilter([1.0], [1.0, -0.9], rng.standard_normal(4000)) + 0.5 * rng.standard_normal(4000)
-    rhythm = np.sign(np.sin(0.12 * np.arange(4000))) + 0.3 * rng.standard_normal(4000)
+    motion = np.sin(np.multiply.outer(np.arange(4000), [0.9, 0.4, 0.2])).sum(1) + 0.3 * rng.standard_normal(4000)
     assert correlated(sensor) > 1.0 and correlated(_unforeseen(sensor, 3)) < 0.03
-    assert correlated(_unforeseen(rhythm, 3)) > 0.1
+    assert correlated(_unforeseen(motion, 3)) > 0.5
     assert np.all(_unforeseen(np.zeros(100), 3) == 0)
