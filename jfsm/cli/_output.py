@@ -38,12 +38,12 @@ def show_table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]
     from rich.text import Text
 
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD)
-    for heading in headings[:-1]:
-        table.add_column(heading, no_wrap=True)
+    for heading, *cells in zip(headings[:-1], *rows, strict=False):
+        table.add_column(heading, no_wrap=True, min_width=max(map(len, [heading, *cells])))  # never cut short
     table.add_column(headings[-1])
     for row in rows:
         table.add_row(*(Text(cell) for cell in row))  # as text: a bracket in a unit or an interval is not markup
-    Console().print(table)
+    Console().print(table, crop=False)
 
 
 def say(message: str) -> None:
@@ -70,12 +70,11 @@ def show_listing(found: "Listing", proposal: str) -> None:
             f"{channel.samples}",
             "-" if channel.rate is None else f"{channel.rate:.6g}",
             "-" if channel.duration is None else f"{channel.duration:.6g}",
-            f"{channel.lowest:.4g}",
-            f"{channel.highest:.4g}",
+            f"{channel.lowest:.4g} to {channel.highest:.4g}",
         )
         for channel in found.channels
     ]
-    headings = ("channel", "unit", "may be", "samples", "rate [Hz]", "seconds", "lowest", "highest")
+    headings = ("channel", "unit", "may be", "samples", "rate [Hz]", "seconds", "range")
     show_table(f"{found.source} does not say which channel is what; it holds", headings, rows)
     for words in (*found.notes, *filter(None, [found.clock])):
         typer.echo(f"  {in_options(words)}")

@@ -145,7 +145,7 @@ def opened(path: Path, demand: str) -> Iterator["h5py.File"]:
     with file:
         try:
             yield file
-        except (RuntimeError, KeyError, OSError, json.JSONDecodeError) as error:  # of a part that cannot be read
+        except Exception as error:  # whatever the library stumbles over in a part that is damaged
             raise ValueError(f"{demand}; parts of it cannot be read ({error}). Write or copy it again.") from error
 
 
