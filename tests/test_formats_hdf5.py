@@ -106,3 +106,14 @@ def test_a_matlab_file_of_version_seven_three_that_is_cut_short_is_refused(tmp_p
     path.write_bytes(path.read_bytes()[:2000])
     with pytest.raises(ValueError, match=r"a\.mat must be a MATLAB file; .*may be cut short\. Write or copy it again"):
         read(path, force="run.tip")
+
+
+def test_what_the_library_says_of_a_damaged_type_is_one_refusal_that_names_the_file(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["F"], file["time"] = U, T
+    content = bytearray((tmp_path / "a.h5").read_bytes())
+    double = bytes([0, 0, 64, 0, 52, 11, 0, 52, 255, 3, 0, 0])  # how HDF5 spells the parts of a double
+    content[content.index(double) + 9] = 0x83  # no type of NumPy has such an exponent
+    (tmp_path / "a.h5").write_bytes(content)
+    with pytest.raises(ValueError, match=r"a\.h5 must be an HDF5 file; parts of it cannot be read .*Write or copy it"):
+        read(tmp_path / "a.h5", force="F")
