@@ -43,7 +43,7 @@ class WavFormat(AbstractFormat):
         kind = columns.dtype.str[1:]
         if kind in FULL_SCALE:
             notes.append(
-                "Numbers are parts of full scale, whose worth is not in the file: it comes by sensitivity, as '0.2/g' "
+                "Numbers are parts of full scale, whose worth is not in the file: say it by sensitivity, as '0.2/g' "
                 "where 0.2 of full scale is 1 g."
             )
         else:
