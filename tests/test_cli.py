@@ -767,7 +767,7 @@ def test_a_file_that_says_nothing_of_its_channels_is_listed_with_the_command_to_
     path.write_text("time [s],Kraft [kN],Weg [mm],LVDT (V),temp [C]\n" + rows)
     result = run("inspect", path)
     assert (result.exit_code, result.stderr) == (0, "")
-    assert re.search(r"Kraft +kN +force +40 +100 +0.39 +0 to 39\b", result.stdout)
+    assert re.search(r"2 +Kraft +kN +force +40 +100 +0.39 +0 to 39\b", result.stdout)
     assert re.search(r"LVDT +V +displacement +40 +100 +0.39 +-36 to 3\b", result.stdout)
     assert re.search(r"temp +C +- +40 ", result.stdout)
     proposal = " ".join(result.stdout.partition("To go on: ")[2].split())
@@ -783,13 +783,20 @@ def test_a_file_that_says_nothing_of_its_channels_has_a_page_with_a_picture_of_e
     assert (result.exit_code, result.stderr) == (0, "")
     source = (tmp_path / "page.html").read_text(encoding="utf-8")
     page, told = html.unescape(source), flat(html.unescape(re.sub(r"<[^>]*>", " ", source)))
-    assert "Kraft kN force 3000 100 29.99 0 2999" in told and "$b$ & c – – 3000 100 29.99 0 6" in told
+    assert "2 Kraft kN force 3000 100 29.99 0 2999" in told and "$b$ & c – – 3000 100 29.99 0 6" in told
     assert f"To go on: jfsm diagnose '{path}' --force Kraft --displacement Weg --model MODEL.toml" in page
     assert page.count('id="channels-axes_') == 3 and "&lt;press&gt;" in source
     assert "Kraft from 0 to 2999 kN" in page and "line 1 '# Rig 7'" in page
     force, _, last = (channel.outline for channel in listing(path).channels)
     assert len(force) <= 1000 and force[0].tolist() == [0.0, 0.0] and force[-1].tolist() == [29.99, 2999.0]
     assert last[:, 1].min() == 0 and last[:, 1].max() == 6
+
+
+def test_long_names_are_listed_whole(tmp_path):
+    name = "Laser at the tip of the cantilever, seen from above, " * 3 + "1"
+    (tmp_path / "a.csv").write_text(f'time [s],"{name} [mm]"\n' + "".join(f"{0.1 * i:.1f},{i}\n" for i in range(9)))
+    line = next(line for line in run("inspect", tmp_path / "a.csv").stdout.splitlines() if name in line)
+    assert line.split()[-5:] == ["10", "0.8", "0", "to", "8"]
 
 
 def test_a_file_without_a_clock_is_listed_with_what_is_missing(tmp_path):

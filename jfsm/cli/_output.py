@@ -11,6 +11,8 @@ from ._input import in_options
 if TYPE_CHECKING:
     from ..records import Listing
 
+PADDING, NARROWEST = 3, 16  # characters around a cell of a table, and in its last column
+
 
 @contextmanager
 def progress() -> Iterator[Callable[[str, int, int], None]]:
@@ -38,12 +40,15 @@ def show_table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]
     from rich.text import Text
 
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD)
-    for heading, *cells in zip(headings[:-1], *rows, strict=False):
-        table.add_column(heading, no_wrap=True, min_width=max(map(len, [heading, *cells])))  # never cut short
+    for heading in headings[:-1]:
+        table.add_column(heading, no_wrap=True)
     table.add_column(headings[-1])
     for row in rows:
         table.add_row(*(Text(cell) for cell in row))  # as text: a bracket in a unit or an interval is not markup
-    Console().print(table, crop=False)
+    console = Console()
+    widths = (max(map(len, column)) for column in zip(headings[:-1], *(row[:-1] for row in rows), strict=True))
+    needed = sum(width + PADDING for width in widths) + NARROWEST
+    Console(width=max(console.width, needed)).print(table, crop=False)  # longer names are for the terminal to wrap
 
 
 def say(message: str) -> None:
@@ -64,6 +69,7 @@ def show_listing(found: "Listing", proposal: str) -> None:
     """The channels of a file of which nothing was asked for, and how to go on."""
     rows = [
         (
+            f"{channel.number or '-'}",
             channel.name,
             channel.unit or "-",
             channel.kind.replace("_", " ") or "-",
@@ -74,7 +80,7 @@ def show_listing(found: "Listing", proposal: str) -> None:
         )
         for channel in found.channels
     ]
-    headings = ("channel", "unit", "may be", "samples", "rate [Hz]", "seconds", "range")
+    headings = ("no.", "channel", "unit", "may be", "samples", "rate [Hz]", "seconds", "range")
     show_table(f"{found.source} does not say which channel is what; it holds", headings, rows)
     for words in (*found.notes, *filter(None, [found.clock])):
         typer.echo(f"  {in_options(words)}")

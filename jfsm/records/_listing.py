@@ -43,6 +43,8 @@ class ListedChannel:
     ----------
     name : str
         As it must be given.
+    number : int or None
+        That may be given instead, from 1; None of a column of a matrix.
     unit : str
         As the file states it; empty if it does not.
     kind : str
@@ -58,6 +60,7 @@ class ListedChannel:
     """
 
     name: str
+    number: int | None
     unit: str
     kind: str
     samples: int
@@ -142,6 +145,7 @@ def _listed(contents: Contents, name: str, array: str, samples: np.ndarray, seco
     duration = float(seconds[-1] - seconds[0]) if seconds.size > 1 else None
     return ListedChannel(
         name=name,
+        number=next((place for place, other in enumerate(contents.arrays, start=1) if other == name), None),
         unit=unit,
         kind=contents.kinds.get(array) or _kind(array, unit),
         samples=samples.size,

@@ -69,6 +69,7 @@ def _plain(value: float | None, digits: int = 6) -> str:
 def _table(channels: Sequence[Dictionary]) -> Table:
     rows = tuple(
         (
+            f"{channel['number'] or ABSENT}",
             channel["name"],
             channel["unit"] or ABSENT,
             channel["kind"].replace("_", " ") or ABSENT,
@@ -80,8 +81,8 @@ def _table(channels: Sequence[Dictionary]) -> Table:
         )
         for channel in channels
     )
-    headings = ("channel", "unit", "may be", "samples", "rate [Hz]", "seconds", "lowest", "highest")
-    return Table("Names as they must be given", headings, rows, frozenset({0, 1, 2}))
+    headings = ("no.", "channel", "unit", "may be", "samples", "rate [Hz]", "seconds", "lowest", "highest")
+    return Table("Names as they must be given", headings, rows, frozenset({1, 2, 3}))
 
 
 def _sketches(channels: Sequence[Dictionary]) -> Iterable[Sketch]:
