@@ -1,6 +1,7 @@
 """The command line: what it prints, what it writes, and the code it ends with."""
 
 import errno
+import html
 import json
 import math
 import os
@@ -22,6 +23,7 @@ from jfsm import Polynomial, Record, Structure, load_map, read
 from jfsm.cli import app
 from jfsm.cli._input import in_options
 from jfsm.diagnosis import Proposal
+from jfsm.records import listing
 
 MASS, STIFFNESS, DAMPING = 2.0, 1800.0, 3.0
 RATE, SAMPLES = 100.0, 500
@@ -765,15 +767,36 @@ def test_a_file_that_says_nothing_of_its_channels_is_listed_with_the_command_to_
     path.write_text("time [s],Kraft [kN],Weg [mm],LVDT (V),temp [C]\n" + rows)
     result = run("inspect", path)
     assert (result.exit_code, result.stderr) == (0, "")
-    assert re.search(r"Kraft +kN +force +40 +100 +0.39 +0 +39\b", result.stdout)
-    assert re.search(r"LVDT +V +displacement +40 +100 +0.39 +-36 +3\b", result.stdout)
+    assert re.search(r"2 +Kraft +kN +force +40 +100 +0.39 +0 to 39\b", result.stdout)
+    assert re.search(r"LVDT +V +displacement +40 +100 +0.39 +-36 to 3\b", result.stdout)
     assert re.search(r"temp +C +- +40 ", result.stdout)
     proposal = " ".join(result.stdout.partition("To go on: ")[2].split())
-    assert proposal == (
-        f"jfsm diagnose '{path}' --force Kraft --displacement Weg --displacement LVDT --model MODEL.toml"
-    )
-    text = refusal("inspect", path, "--report", tmp_path / "page.html")
-    assert f"jfsm inspect '{path}' --force Kraft --displacement Weg" in text
+    assert proposal == f"jfsm diagnose '{path}' --force Kraft --displacement Weg --model MODEL.toml"
+    assert "must say when" not in result.stdout
+
+
+def test_a_file_that_says_nothing_of_its_channels_has_a_page_with_a_picture_of_each(tmp_path):
+    rows = "".join(f"{0.01 * i:.2f},{i},{2 * i},{'' if 5 < i < 9 else i % 7}\n" for i in range(3000))
+    path = tmp_path / "<press>.log"
+    path.write_text("# Rig 7\ntime [s],Kraft [kN],Weg [mm],$b$ & c\n" + rows)
+    result = run("inspect", path, "--report", tmp_path / "page.html")
+    assert (result.exit_code, result.stderr) == (0, "")
+    source = (tmp_path / "page.html").read_text(encoding="utf-8")
+    page, told = html.unescape(source), flat(html.unescape(re.sub(r"<[^>]*>", " ", source)))
+    assert "2 Kraft kN force 3000 100 29.99 0 2999" in told and "$b$ & c – – 3000 100 29.99 0 6" in told
+    assert f"To go on: jfsm diagnose '{path}' --force Kraft --displacement Weg --model MODEL.toml" in page
+    assert page.count('id="channels-axes_') == 3 and "&lt;press&gt;" in source
+    assert "Kraft from 0 to 2999 kN" in page and "line 1 '# Rig 7'" in page
+    force, _, last = (channel.outline for channel in listing(path).channels)
+    assert len(force) <= 1000 and force[0].tolist() == [0.0, 0.0] and force[-1].tolist() == [29.99, 2999.0]
+    assert last[:, 1].min() == 0 and last[:, 1].max() == 6
+
+
+def test_long_names_are_listed_whole(tmp_path):
+    name = "Laser at the tip of the cantilever, seen from above, " * 3 + "1"
+    (tmp_path / "a.csv").write_text(f'time [s],"{name} [mm]"\n' + "".join(f"{0.1 * i:.1f},{i}\n" for i in range(9)))
+    line = next(line for line in run("inspect", tmp_path / "a.csv").stdout.splitlines() if name in line)
+    assert line.split()[-5:] == ["10", "0.8", "0", "to", "8"]
 
 
 def test_a_file_without_a_clock_is_listed_with_what_is_missing(tmp_path):
@@ -788,6 +811,16 @@ def test_an_inspection_ends_with_the_command_to_go_on_with(channels, folder):
         f"To go on: jfsm diagnose {folder / 'run.csv'} --force u --displacement y --unit u=N --unit y=mm --until 3.0 "
         f"--at-rest --model MODEL.toml"
     )
+
+
+def test_the_command_to_go_on_with_makes_an_uneven_clock_uniform(tmp_path):
+    time = 0.01 * np.arange(60) + np.where(np.arange(60) % 3, 0.0, 2e-3)
+    text = "time [s],F [N],x [mm]\n" + "".join(f"{t:.4f},{np.sin(5 * t):.5f},{np.cos(5 * t):.5f}\n" for t in time)
+    (tmp_path / "a.csv").write_text(text)
+    told = flat(run("inspect", tmp_path / "a.csv", "--force", "F", "--displacement", "x").stdout)
+    assert told.endswith("--force F --displacement x --resample auto --model MODEL.toml")
+    told = flat(run("inspect", tmp_path / "a.csv", "--force", "F", "--displacement", "x", "--resample", 100).stdout)
+    assert told.endswith("--force F --displacement x --resample 100 --model MODEL.toml")
 
 
 def test_every_so_manieth_sample_is_kept_without_aliasing(channels):

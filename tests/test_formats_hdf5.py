@@ -97,8 +97,41 @@ def test_matlab_files_of_version_seven_three_are_read_like_older_ones(tmp_path):
 
 
 def test_only_numbers_of_a_matlab_file_of_version_seven_three_are_channels(tmp_path):
-    with pytest.raises(ValueError, match="which holds 'run.on', 'run.tip', 'time'; it was 'run.comment'"):
+    with pytest.raises(ValueError, match="which holds 'cells.1.', 'run.on', 'run.tip', 'time'; it was 'run.comment'"):
         read(_matlab_7_3(tmp_path / "a.mat"), force="run.comment")
+
+
+def test_cells_arrays_of_structs_texts_and_units_of_version_seven_three_are_kept_and_the_rest_is_named(tmp_path):
+    path = tmp_path / "a.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
+
+        def put(name, array, kind=b"double"):
+            file[name] = array
+            if kind:
+                file[name].attrs["MATLAB_class"] = np.bytes_(kind)
+            return file[name].ref
+
+        def text(name, words):
+            return put(name, np.frombuffer(words.encode("utf-16-le"), np.uint16)[:, None], b"char")
+
+        put("t", T[None, :])
+        runs = [put("#refs#/a", U[None, :]), put("#refs#/b", 2 * U[None, :])]
+        put("cells", np.array(runs, dtype=h5py.ref_dtype)[:, None], b"cell")  # 1 x 2 in MATLAB
+        labels = [text("#refs#/c", "tip"), text("#refs#/d", "root")]
+        values = [put("#refs#/e", Y[None, :]), put("#refs#/f", -Y[None, :])]
+        units = [text("#refs#/g", "mm"), text("#refs#/h", "mm")]
+        for field, refs in (("label", labels), ("values", values), ("unit", units)):
+            put(f"scope/{field}", np.array(refs, dtype=h5py.ref_dtype)[:, None], b"")  # an array of structs
+        file["scope"].attrs["MATLAB_class"] = np.bytes_(b"struct")
+        put("series", np.zeros((1, 6), np.uint32), b"timeseries")
+        file["series"].attrs["MATLAB_object_decode"] = np.int32(3)
+        file["elsewhere"] = h5py.ExternalLink("other.h5", "/x")
+    with path.open("r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+    record = read(path, force="cells{2}", displacement={1: "root", 2: "scope{1}.values"}, time="t")
+    np.testing.assert_array_equal(record.force, 2 * U[:, None])
+    np.testing.assert_allclose(np.asarray(record.displacement), np.stack([-1e-3 * Y, 1e-3 * Y], 1), rtol=1e-12)
+    assert any("series (an object of class timeseries)" in note for note in record.notes)
 
 
 def test_a_matlab_file_of_version_seven_three_that_is_cut_short_is_refused(tmp_path):
@@ -106,3 +139,14 @@ def test_a_matlab_file_of_version_seven_three_that_is_cut_short_is_refused(tmp_p
     path.write_bytes(path.read_bytes()[:2000])
     with pytest.raises(ValueError, match=r"a\.mat must be a MATLAB file; .*may be cut short\. Write or copy it again"):
         read(path, force="run.tip")
+
+
+def test_what_the_library_says_of_a_damaged_type_is_one_refusal_that_names_the_file(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["F"], file["time"] = U, T
+    content = bytearray((tmp_path / "a.h5").read_bytes())
+    double = bytes([0, 0, 64, 0, 52, 11, 0, 52, 255, 3, 0, 0])  # how HDF5 spells the parts of a double
+    content[content.index(double) + 9] = 0x83  # no type of NumPy has such an exponent
+    (tmp_path / "a.h5").write_bytes(content)
+    with pytest.raises(ValueError, match=r"a\.h5 must be an HDF5 file; parts of it cannot be read .*Write or copy it"):
+        read(tmp_path / "a.h5", force="F")

@@ -177,8 +177,22 @@ def test_columns_of_json_have_names_and_units(tmp_path, shape):
     np.testing.assert_allclose(record.time, T)
     np.testing.assert_allclose(record.channels["force", 1], F)
     np.testing.assert_allclose(record.channels["displacement", 1], X)
+    if shape == "nested":
+        assert read(tmp_path / "a.json", force="F", displacement="x", units={"x": "mm"}).notes == record.notes
     if shape == "columns":
         assert "Not numbers, and left out: who." in record.notes
+
+
+def test_units_of_json_may_stand_farther_out_and_the_end_of_a_name_does_where_it_is_the_only_one(tmp_path):
+    columns = {"F": (F / 1e3).tolist(), "x": (1e3 * X).tolist()}
+    given = {"rate": 200, "units": {"F": "kN"}, "a": {**columns, "units": {"x": "mm"}}, "b": {"x": [1.0, 2.0, 3.0]}}
+    (tmp_path / "a.json").write_text(json.dumps(given))
+    record = read(tmp_path / "a.json", force="F", displacement="a.x", rate=200)
+    np.testing.assert_allclose(record.channels["force", 1], F)
+    np.testing.assert_allclose(record.channels["displacement", 1], X)
+    assert not any("left out" in note or "not stated" in note for note in record.notes)
+    with pytest.raises(ValueError, match=r"'x' may be 'a\.x' or 'b\.x'"):
+        read(tmp_path / "a.json", force="F", displacement="x", rate=200)
 
 
 @pytest.mark.parametrize("text", ['{"time": [0, 1', '{"a": "b"}', '[{"a": 1}, [2]]'])

@@ -1,6 +1,7 @@
 """The first page of an examination says what is wrong with a record, and nothing when nothing is."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -191,3 +192,25 @@ def test_the_page_is_plain_data_and_can_be_printed(capsys):
     shown = capsys.readouterr().out
     assert "run 7  2000 samples, 19.99 s, 100 Hz" in shown
     assert "displacement 1: Offset of 0.3" in shown
+
+
+def test_of_a_very_long_record_the_loudest_part_is_examined_and_it_is_said(monkeypatch):
+    monkeypatch.setattr("jfsm.records._loudest.ENOUGH", 4000)
+    rng = np.random.default_rng(4)
+    t = np.arange(20_000) / 100.0
+    loud = np.where((t > 90.0) & (t < 140.0), 1.0, 0.2)
+    y = loud * np.sin(2 * np.pi * t) + rng.normal(scale=1e-3, size=t.size)
+    y[300] += 0.5
+    inspection = Record(t, loud * np.cos(2 * np.pi * t), displacement=y).inspect()
+    said = [finding.message for finding in inspection.findings if finding.channel == "record"]
+    assert any(re.search(r"those of 4000 of the 20000 samples.* t = 100 to 139.99 s", message) for message in said)
+    figures = {channel.channel: channel for channel in inspection.channels}["displacement 1"]
+    assert figures.spikes == 1 and figures.maximum > 0.99  # of the whole record
+    assert figures.noise == pytest.approx(1e-3, rel=0.1) and inspection.samples == 20_000
+    assert inspection.spectra[0].frequency[0] > 1 / 40  # of the part
+
+
+def test_up_to_half_a_million_samples_all_are_examined():
+    t = np.arange(3000) / 100.0
+    said = Record(t, np.sin(t), displacement=np.cos(t)).inspect().findings
+    assert not any("of the 3000 samples" in finding.message for finding in said)

@@ -16,6 +16,7 @@ from ._input import (
     ShownUnits,
     Units,
     check_outputs,
+    is_even,
     link,
     load,
     option,
@@ -43,9 +44,11 @@ def inspect(
     """Show what a record holds, and what is odd about it; of a file whose channels have no kinds, the channels."""
     check_outputs({"--report": report}, [source.record])
     if (found := source.listing(source.record)) is not None:
+        proposal = source.proposal("diagnose", found.proposed)
         if report is not None:
-            raise ValueError(f"--report needs channels: {source.proposal('inspect', found.proposed)}")
-        show_listing(found, source.proposal("diagnose", found.proposed))
+            with said_in_options():
+                found.report(report, proposal)
+        show_listing(found, proposal)
         return
     record = source.read()
     units, inspection = shown_units(out_units, record), record.inspect()
@@ -53,7 +56,7 @@ def inspect(
         inspection.report(report, units)
     with said_in_options():
         inspection.print(units)  # last, so that a reader who closes the pipe loses no file
-    typer.echo(f"To go on: {source.proposal('diagnose')}")
+    typer.echo(f"To go on: {source.proposal('diagnose', even=is_even(record))}")
 
 
 @command

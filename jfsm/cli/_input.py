@@ -145,10 +145,12 @@ class RecordFile(_Channels):
 
     record: Annotated[Path, _argument("RECORD", f"The record: {_FORMATS}")]
 
-    def proposal(self, command: str, names: Mapping[str, Sequence[str]] | None = None) -> str:
-        """The command line that does something with the record, its channels those of these `names`."""
+    def proposal(self, command: str, names: Mapping[str, Sequence[str]] | None = None, *, even: bool = True) -> str:
+        """The command line that does something with the record, its channels those of these `names`, its clock made
+        uniform if it is not `even`."""
         channels = [word for kind, of in (names or {}).items() for name in of for word in (f"--{_dashed(kind)}", name)]
-        words = ["jfsm", command, str(self.record), *channels, *self.given()]
+        uniform = [] if even else ["--resample", "auto"]
+        words = ["jfsm", command, str(self.record), *channels, *self.given(), *uniform]
         model = ["--model", "MODEL.toml"] if command == "diagnose" else []
         return shlex.join([*words, *model])
 
@@ -200,6 +202,15 @@ def takes_record(function: Callable[..., None]) -> Callable[..., None]:
     run.__signature__ = signature(function).replace(parameters=parameters)  # pyright: ignore[reportAttributeAccessIssue]
     run.__annotations__ = {p.name: p.annotation for p in parameters}
     return run
+
+
+def is_even(record: "Record") -> bool:
+    """Whether the clock of a record is uniform, as a model needs it."""
+    try:
+        _ = record.dt
+    except ValueError:
+        return False
+    return True
 
 
 def load(path: Path) -> "Structure":

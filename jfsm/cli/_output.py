@@ -11,6 +11,8 @@ from ._input import in_options
 if TYPE_CHECKING:
     from ..records import Listing
 
+PADDING, NARROWEST = 3, 16  # characters around a cell of a table, and in its last column
+
 
 @contextmanager
 def progress() -> Iterator[Callable[[str, int, int], None]]:
@@ -43,7 +45,10 @@ def show_table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]
     table.add_column(headings[-1])
     for row in rows:
         table.add_row(*(Text(cell) for cell in row))  # as text: a bracket in a unit or an interval is not markup
-    Console().print(table)
+    console = Console()
+    widths = (max(map(len, column)) for column in zip(headings[:-1], *(row[:-1] for row in rows), strict=True))
+    needed = sum(width + PADDING for width in widths) + NARROWEST
+    Console(width=max(console.width, needed)).print(table, crop=False)  # longer names are for the terminal to wrap
 
 
 def say(message: str) -> None:
@@ -64,18 +69,18 @@ def show_listing(found: "Listing", proposal: str) -> None:
     """The channels of a file of which nothing was asked for, and how to go on."""
     rows = [
         (
+            f"{channel.number or '-'}",
             channel.name,
             channel.unit or "-",
             channel.kind.replace("_", " ") or "-",
             f"{channel.samples}",
             "-" if channel.rate is None else f"{channel.rate:.6g}",
             "-" if channel.duration is None else f"{channel.duration:.6g}",
-            f"{channel.lowest:.4g}",
-            f"{channel.highest:.4g}",
+            f"{channel.lowest:.4g} to {channel.highest:.4g}",
         )
         for channel in found.channels
     ]
-    headings = ("channel", "unit", "may be", "samples", "rate [Hz]", "seconds", "lowest", "highest")
+    headings = ("no.", "channel", "unit", "may be", "samples", "rate [Hz]", "seconds", "range")
     show_table(f"{found.source} does not say which channel is what; it holds", headings, rows)
     for words in (*found.notes, *filter(None, [found.clock])):
         typer.echo(f"  {in_options(words)}")

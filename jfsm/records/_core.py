@@ -20,5 +20,7 @@ def _core_of(size: NDArray[np.float64]) -> float:
         core = size[size <= CORE * std]
         if core.size == 0 or std == 0:
             return std
-        std = float(np.sqrt(np.mean(core**2) / CORE_VARIANCE))
+        before, std = std, float(np.sqrt(np.mean(core**2) / CORE_VARIANCE))
+        if std == before:  # the same core again
+            break
     return std

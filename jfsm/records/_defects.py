@@ -97,10 +97,13 @@ def spikes(y: ArrayLike, std: float) -> NDArray[np.bool_]:
         disturbance[[0, -1]] = off_median[[0, -1]]  # continued beyond itself, an end is never off
         limit = SPIKE_ROBUST * np.maximum(_deviation_around(disturbance), 1e-12 * np.ptp(y))
         suspects = np.flatnonzero((off_median > SPIKE_FLOORS * std) & (disturbance > limit))
+        before = int(mask.sum())
         for i in suspects[np.argsort(-disturbance[suspects])]:  # the highest first: they disturb their neighbours
             for torn in TORN:
                 if not mask[i] and _mended(y, i + np.array(torn), float(limit[i])):
                     mask[i + np.array(torn)] = True
+        if mask.sum() == before:
+            break
     height = maximum_filter1d(np.abs(original - y), 5)  # what is torn together stands or falls together
     left = _off_curve(y)
     left[:BESIDE] = left[-BESIDE:] = 0.0  # of the ends no curve tells

@@ -17,6 +17,7 @@ from jfsm.records._comparison import Comparison, Reading
 from jfsm.records._consistency import KINDS, comparisons, of_comparisons
 from jfsm.records._figures import capitalised, plus_minus
 from jfsm.records._look import look
+from jfsm.records._loudest import loudest_part
 from jfsm.records._mended import mended
 from jfsm.records._noise_floor import SHORTEST, noise_floor
 from jfsm.records._noise_spectrum import NoiseSpectrum, noise_spectrum
@@ -141,7 +142,12 @@ def inspect(record: AbstractRecord) -> Inspection:
         dt = uniform.dt
     checks = look(uniform).checks
     findings.extend(_of_looks(checks))
-    record, uniform = mended(record), mended(uniform)
+    sound = mended(record)
+    uniform = sound if uniform is record else mended(uniform)
+    record = sound
+    whole, uniform = uniform, loudest_part(uniform)
+    if uniform is not whole:
+        findings.append(_of_the_part(uniform, len(whole)))
 
     traces: list[Trace] = []
     summaries: dict[str, ChannelSummary] = {}
@@ -235,6 +241,15 @@ def _of_the_clock(record: AbstractRecord, gaps: tuple[tuple[float, float], ...])
             f"{'Do not fit across it: cut the record there.' if long else 'Resampling bridges them.'}"
         )
         yield Finding("warning" if long else "info", "record", message)
+
+
+def _of_the_part(part: AbstractRecord, samples: int) -> Finding:
+    """What of a very long record is told from a part."""
+    message = (
+        f"Noise, spectra, offsets and what compares channels are those of {len(part)} of the {samples} samples, the "
+        f"loudest, t = {part.time[0]:.6g} to {part.time[-1]:.6g} s; extremes, gaps and lost samples those of all."
+    )
+    return Finding("info", "record", message)
 
 
 def _turning(record: AbstractRecord, acceleration: str) -> np.ndarray | None:

@@ -1,12 +1,15 @@
 """What a file holds, before anyone has said what its channels mean: names, units, clocks, and what they may be."""
 
 import contextlib
+import itertools
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jfsm.records._sources import opened
 from jfsm.records._units import KINDS, find_unit
@@ -29,6 +32,8 @@ _QUANTITIES = {
     "acceleration": ("acceleration", "rotation_acceleration"),
 }
 
+STRETCHES = 500  # of a small picture
+
 
 @dataclass(frozen=True)
 class ListedChannel:
@@ -38,6 +43,8 @@ class ListedChannel:
     ----------
     name : str
         As it must be given.
+    number : int or None
+        That may be given instead, from 1; None of a column of a matrix.
     unit : str
         As the file states it; empty if it does not.
     kind : str
@@ -47,9 +54,13 @@ class ListedChannel:
         Extremes of its numbers as they stand in the file, gaps aside.
     rate, duration : float or None
         Samples per second [Hz] and time from the first to the last [s]; None without a clock.
+    outline : (m, 2) float array
+        Instants [s], or sample numbers without a clock, and numbers of the samples that a small picture shows: the
+        lowest and the highest of each of so many stretches.
     """
 
     name: str
+    number: int | None
     unit: str
     kind: str
     samples: int
@@ -57,6 +68,7 @@ class ListedChannel:
     highest: float
     rate: float | None
     duration: float | None
+    outline: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -74,9 +86,28 @@ class Listing:
 
     @property
     def proposed(self) -> dict[str, tuple[str, ...]]:
-        """Names by kind, of the channels of which unit or name tells the kind."""
-        kinds = (kind for kind in KINDS if any(channel.kind == kind for channel in self.channels))
-        return {kind: tuple(channel.name for channel in self.channels if channel.kind == kind) for kind in kinds}
+        """Names by kind, of the channels of which the unit tells the kind; where none does, of those whose name may."""
+        found = dict[str, tuple[str, ...]]()
+        for kind in KINDS:
+            alike = [channel for channel in self.channels if channel.kind == kind]
+            told = [channel for channel in alike if _is_of(kind, channel.unit)]
+            if alike:
+                found[kind] = tuple(channel.name for channel in told or alike)
+        return found
+
+    def report(self, path: str | Path, proposal: str = "") -> None:
+        """Write a self-contained HTML page: the channels with a small picture each, and a command line to go on with.
+
+        The file appears under its name only when it is complete.
+
+        Raises
+        ------
+        OSError
+            If `path` is not a file in a folder that can be written to; what stood there is still there.
+        """
+        from jfsm.reporting import render_listing, write_text_atomically
+
+        write_text_atomically(path, render_listing({**vars(self), "channels": map(vars, self.channels)}, proposal))
 
 
 def listing(
@@ -85,7 +116,8 @@ def listing(
     """What a file or a table in memory holds; arguments and errors as of `read`, but that no channel need be named."""
     contents, called, _ = opened(source)
     contents, _ = chosen_run(contents, called, run, sheet)
-    channels, notes, why, clocks = list[ListedChannel](), dict.fromkeys(contents.notes), "", set[str]()
+    channels, notes = list[ListedChannel](), dict.fromkeys(contents.notes)
+    clocks, without = set[str](), dict[str, str]()
     for name, array, samples in _series(contents):
         seconds = np.empty(0)
         try:
@@ -94,9 +126,10 @@ def listing(
             clocks.update(column.array for column in clock.columns)
             notes |= dict.fromkeys(clock.notes)
         except ValueError as error:
-            why = why or str(error)
+            without[name] = str(error)
         channels.append(_listed(contents, name, array, samples, seconds))
     listed = tuple(channel for channel in channels if channel.name not in clocks)
+    why = next((without[channel.name] for channel in listed if channel.name in without), "")
     return Listing(called, listed, tuple(notes), _is_told(contents, called), why)
 
 
@@ -112,6 +145,7 @@ def _listed(contents: Contents, name: str, array: str, samples: np.ndarray, seco
     duration = float(seconds[-1] - seconds[0]) if seconds.size > 1 else None
     return ListedChannel(
         name=name,
+        number=next((place for place, other in enumerate(contents.arrays, start=1) if other == name), None),
         unit=unit,
         kind=contents.kinds.get(array) or _kind(array, unit),
         samples=samples.size,
@@ -119,17 +153,38 @@ def _listed(contents: Contents, name: str, array: str, samples: np.ndarray, seco
         highest=float(np.max(finite, initial=-np.inf)),
         rate=(seconds.size - 1) / duration if duration else None,
         duration=duration,
+        outline=_outline(seconds if seconds.size == samples.size else np.arange(samples.size), samples),
     )
+
+
+def _outline(place: NDArray[Any], samples: NDArray[Any]) -> NDArray[np.float64]:
+    """Places and values (m, 2) of the lowest and the highest sample of each stretch, or of all if they are few."""
+    kept = np.arange(samples.size)
+    if samples.size > 2 * STRETCHES:
+        edges = np.linspace(0, samples.size, STRETCHES + 1).astype(int)
+        shown = (np.where(np.isfinite(samples), samples, gap) for gap in (np.inf, -np.inf))
+        below, above = (
+            [first + find(y[first:last]) for first, last in itertools.pairwise(edges)]
+            for y, find in zip(shown, (np.argmin, np.argmax), strict=True)
+        )
+        kept = np.unique(np.concatenate([below, above]))
+    return np.column_stack([place[kept], samples[kept]]).astype(np.float64)
 
 
 def _kind(name: str, unit: str) -> str:
     """What a channel may be: by its unit; by its name where that says nothing, or says volts."""
-    for kind, quantities in _QUANTITIES.items():
-        with contextlib.suppress(ValueError):
-            if unit and find_unit(unit, kind).quantity in quantities:
-                return kind
+    for kind in _QUANTITIES:
+        if _is_of(kind, unit):
+            return kind
     last = re.split(r"[./]", name)[-1]
     return next((kind for kind, pattern in _NAMES.items() if pattern.search(last)), "")
+
+
+def _is_of(kind: str, unit: str) -> bool:
+    """Whether a unit is one of a kind of channel."""
+    with contextlib.suppress(ValueError):
+        return bool(unit) and find_unit(unit, kind).quantity in _QUANTITIES.get(kind, ())
+    return False
 
 
 def _series(contents: Contents) -> Iterator[tuple[str, str, np.ndarray]]:

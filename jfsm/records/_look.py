@@ -15,6 +15,7 @@ from jfsm.records._consistency import KINDS, comparisons, of_polarity
 from jfsm.records._decay import growth_of
 from jfsm.records._defects import clipped
 from jfsm.records._figures import plus_minus
+from jfsm.records._loudest import loudest_part
 from jfsm.records._mended import hung_words, mended, torn_and_hung, torn_words
 from jfsm.records._noise_floor import SHORTEST
 from jfsm.records._polarity import ERRORS, polarity
@@ -120,16 +121,17 @@ def look(record: AbstractRecord) -> Look:
     share = 1.0 - (span.end - span.begin) / len(record)
     checks.append(_checked("moves_throughout", "record", share, 0.0, "; ".join(rest_words(record, span)) or "moves"))
     moving = sound[span.begin : span.end] if share else sound
-    pairs, signs, inverted = _signs_and_scales(moving)
+    loudest = loudest_part(moving)
+    pairs, signs, inverted = _signs_and_scales(loudest)
     checks += signs
-    power = [*_powers(moving)]
+    power = [*_powers(loudest)]
     checks += power
     inverted += [("force", int(check.of.split()[1])) for check in power if not check.passed]
-    pushes = [*_pushes(moving, [f"{kind} {j}" for kind, j in inverted])]
+    pushes = [*_pushes(loudest, [f"{kind} {j}" for kind, j in inverted])]
     checks += pushes
     for check in pushes:
         if not check.passed:
-            inverted = _with_force(inverted, int(check.of.split()[1]), moving)
+            inverted = _with_force(inverted, int(check.of.split()[1]), loudest)
     undriven = [*_undriven(moving)]
     checks += undriven
     if not all(check.passed for check in undriven):

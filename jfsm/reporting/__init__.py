@@ -8,6 +8,7 @@ from ._force_map_page import print_force_map as print_force_map
 from ._force_map_page import render_force_map as render_force_map
 from ._inspection_page import render_inspection as render_inspection
 from ._inspection_pictures import inspection_pictures as inspection_pictures
+from ._listing_page import render_listing as render_listing
 from ._page import render_page as render_page
 from ._page_again import read_diagnosis as read_diagnosis
 from ._page_again import render_json as render_json

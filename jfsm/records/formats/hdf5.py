@@ -44,7 +44,7 @@ class Hdf5Format(AbstractFormat):
             for column in item.dtype.names or ():
                 if item.dtype[column].kind in NUMERIC:
                     places[f"{name}.{column}"] = name, column
-            unit = _word(item.attrs.get("units", item.attrs.get("unit")))
+            unit = word(item.attrs.get("units", item.attrs.get("unit")))
             if unit:
                 units[name] = unit
             if item.dtype.kind not in NUMERIC and not item.dtype.names:
@@ -116,7 +116,7 @@ def _packing(item: Any) -> _Packing | None:
     return _Packing(scale, offset, tuple(dict.fromkeys(gaps)))
 
 
-def _word(attribute: Any) -> str:
+def word(attribute: Any) -> str:
     """The text of an attribute of any type: str, bytes, or an array of one of them."""
     if isinstance(attribute, np.ndarray) and attribute.size == 1:
         attribute = attribute.ravel()[0]
@@ -145,7 +145,7 @@ def opened(path: Path, demand: str) -> Iterator["h5py.File"]:
     with file:
         try:
             yield file
-        except (RuntimeError, KeyError, OSError, json.JSONDecodeError) as error:  # of a part that cannot be read
+        except Exception as error:  # whatever the library stumbles over in a part that is damaged
             raise ValueError(f"{demand}; parts of it cannot be read ({error}). Write or copy it again.") from error
 
 

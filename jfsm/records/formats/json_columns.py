@@ -14,7 +14,7 @@ from jfsm.records.formats.headings import headings_of
 class JsonFormat(AbstractFormat):
     """Lists of numbers by name, an object in an object as ``run.force``; or a list of rows, each an object. Read only.
 
-    Single numbers such as ``fs`` are arrays, too; ``units`` beside the columns gives the unit of each.
+    Single numbers such as ``fs`` are arrays, too; ``units`` beside the columns, or farther out, gives the unit of each.
     """
 
     name: ClassVar[str] = "JSON"
@@ -31,14 +31,14 @@ class JsonFormat(AbstractFormat):
             raise ValueError(f"{path.name} must be JSON; {error}. Write or copy it again.") from error
         if isinstance(given, list):
             given = _columns_of_rows(given, path)
-        units = given.get("units") if isinstance(given, Mapping) else None
+        units = dict(_units("", given))
         arrays: dict[str, np.ndarray] = {}
         skipped: list[str] = []
         for name, value in _leaves("", given):
             array = _numbers(value)
             if array is not None:
                 arrays[name] = array
-            elif not name.startswith("units"):
+            elif not any(name.startswith(f"{place}units.") for place in units):
                 skipped.append(name)
         if not arrays:
             raise ValueError(
@@ -46,18 +46,37 @@ class JsonFormat(AbstractFormat):
             )
         names = list(arrays)
         headings = headings_of([names], len(names))
-        stated = dict(units) if isinstance(units, Mapping) else {}
+        stated = {name: unit for name in names if (unit := _stated(units, name))}
         notes = [f"Not numbers, and left out: {', '.join(skipped[:6])}."] if skipped else []
         return Contents(
             dict(zip(headings.names, arrays.values(), strict=True)),
             {
-                name: str(stated.get(original, headings.units.get(name, "")))
+                name: unit
                 for name, original in zip(headings.names, names, strict=True)
-                if stated.get(original, headings.units.get(name))
+                if (unit := stated.get(original, headings.units.get(name)))
             },
             notes=tuple(notes),
             aliases=headings.aliases,
         )
+
+
+def _units(place: str, value: Any) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """What stands under ``units``, with the place where it does: "" or ``run.``."""
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            if key == "units" and isinstance(item, Mapping):
+                yield place, item
+            else:
+                yield from _units(f"{place}{key}.", item)
+
+
+def _stated(units: Mapping[str, Mapping[str, Any]], name: str) -> str:
+    """The unit of a column: by its whole name or the end of it, beside it or farther out."""
+    for place in sorted(filter(name.startswith, units), key=len, reverse=True):
+        for key in (name.removeprefix(place), name.rpartition(".")[2]):
+            if isinstance(unit := units[place].get(key), str):
+                return unit
+    return ""
 
 
 def _columns_of_rows(rows: list[Any], path: Path) -> dict[str, list[Any]]:

@@ -70,14 +70,14 @@ def choose(contents: Contents, source: str, kind: str, name: str) -> Choice:
 
 
 def _meant(contents: Contents, text: str) -> tuple[str, ...]:
-    """The arrays that a text may stand for: by name, by what else the file calls them, or by number from 1."""
+    """The arrays that a text may stand for: by name, what else the file calls them, number from 1, or end of a name."""
     if text in contents.arrays:
         return (text,)
     if text in contents.aliases:
         return contents.aliases[text]
     if text.isdigit() and 1 <= int(text) <= len(contents.arrays):
         return (list(contents.arrays)[int(text) - 1],)
-    return ()
+    return tuple(name for name in contents.arrays if name.endswith((f"/{text}", f".{text}")))
 
 
 def samples_of(contents: Contents, source: str, choice: Choice) -> NDArray[Any]:

@@ -1,14 +1,16 @@
 """MATLAB files, of version 7.3 (which are HDF5) and before."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 import scipy.io
 
+from jfsm.records.formats import mat73
 from jfsm.records.formats.base import ABOUT, AbstractFormat, Contents, Lazy
-from jfsm.records.formats.hdf5 import NUMERIC, dataset, opened
+from jfsm.records.formats.hdf5 import NUMERIC
 from jfsm.records.formats.mat5 import require_sound
 
 
@@ -25,19 +27,15 @@ class MatFormat(AbstractFormat):
         try:
             require_sound(path)
             variables = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
-        except NotImplementedError:
-            return _version_7_3(path)
+        except NotImplementedError:  # of version 7.3
+            return _found(mat73.variables(path)).contents({}, path)
         except Exception as error:  # whatever the reader stumbles over in bytes that are no such file
             raise ValueError(
                 f"{path.name} must be a MATLAB file; it cannot be opened as one ({error}), and may be cut short. "
                 f"Write or copy it again."
             ) from error
         remarks = json.loads(str(variables.pop(ABOUT))) if ABOUT in variables else {}
-        found = _Found()
-        for name, value in variables.items():
-            if not name.startswith("__"):
-                found.take(name, value)
-        return found.contents(remarks, path)
+        return _found(variables).contents(remarks, path)
 
     def save(self, path: Path, contents: Contents) -> None:
         remarks = json.dumps({"units": dict(contents.units), **contents.about})
@@ -66,7 +64,7 @@ class _Found:
     """What lies below the variables of a file: numbers by dotted name, their labels and units, and what was skipped."""
 
     def __init__(self) -> None:
-        self._arrays: dict[str, np.ndarray] = {}
+        self._arrays: dict[str, np.ndarray | mat73.Late] = {}
         self._units: dict[str, str] = {}
         self._labels: dict[str, list[str]] = {}
         self._skipped: list[str] = []
@@ -83,6 +81,8 @@ class _Found:
         elif isinstance(value, np.ndarray) and value.dtype.kind == "O":
             for place, item in enumerate(value.ravel(order="F"), start=1):
                 self.take(f"{name}{{{place}}}", item)
+        elif isinstance(value, mat73.Late):
+            self._arrays[name] = value
         elif isinstance(value, int | float | np.ndarray | np.number) and np.asarray(value).dtype.kind in NUMERIC:
             if np.size(value):
                 self._arrays[name] = np.asarray(value)
@@ -106,7 +106,7 @@ class _Found:
         units = {name: unit for name, unit in self._units.items() if name in self._arrays}
         aliases = {text: tuple(n for n in names if n in self._arrays) for text, names in self._labels.items()}
         return Contents(
-            self._arrays,
+            Lazy(self._arrays, lambda name: np.asarray(self._arrays[name])),
             {**units, **remarks.pop("units", {})},
             remarks,
             clocks={name: clock for name, clock in self._clocks.items() if name in self._arrays},
@@ -147,6 +147,14 @@ class _Found:
                     self._units[holder] = text.strip()
 
 
+def _found(variables: Mapping[str, Any]) -> _Found:
+    found = _Found()
+    for name, value in variables.items():
+        if not name.startswith("__"):
+            found.take(name, value)
+    return found
+
+
 def _text(struct: Any, *fields: str) -> str:
     """The text at the end of a chain of fields, empty where it breaks off."""
     for field in fields:
@@ -157,6 +165,8 @@ def _text(struct: Any, *fields: str) -> str:
 def _class_name(value: Any) -> str:
     """What MATLAB calls the class of something that is not read."""
     kind = type(value).__name__
+    if isinstance(value, mat73.Unread):
+        return value.what
     if isinstance(value, scipy.io.matlab.MatlabFunction):
         return "a function"
     if isinstance(value, scipy.io.matlab.MatlabOpaque):
@@ -164,26 +174,3 @@ def _class_name(value: Any) -> str:
         known = [n.decode() if isinstance(n, bytes) else n for n in names if n not in ("MCOS", b"MCOS")]
         return f"an object of class {known[-1]}" if known else "an object"
     return kind
-
-
-def _version_7_3(path: Path) -> Contents:
-    """The same names and shapes as from an older file: MATLAB keeps structs as groups, and arrays transposed."""
-    demand = f"{path.name} must be a MATLAB file"
-    places: dict[str, str] = {}
-
-    def visit(place: str, item: Any) -> None:
-        if not hasattr(item, "dtype") or item.dtype.kind not in NUMERIC or place.startswith("#"):
-            return  # groups, cells, and what MATLAB files away under #refs#
-        is_text = item.attrs.get("MATLAB_class", b"double") in (b"char", "char")
-        is_sparse = "MATLAB_sparse" in item.parent.attrs  # its parts are indices and values
-        if not (is_text or is_sparse or "MATLAB_empty" in item.attrs):
-            places[place.replace("/", ".")] = place
-
-    with opened(path, demand) as file:
-        file.visititems(visit)
-
-    def array(name: str) -> np.ndarray:
-        with opened(path, demand) as file:
-            return np.squeeze(dataset(file, places[name]).T)
-
-    return Contents(Lazy(places, array))
