@@ -487,7 +487,8 @@ class Climber:
 def going_on(climbers: list[Climber], kept: tuple[str, ...] = ()) -> list[str]:
     every: Any = climbers
     staying: Any = [c for c in climbers if c.candidates[0] in kept]
-    return [c.candidates[0] for c in climbing._going_on(every, STAGES, 1, staying)]
+    on: Any = climbing._going_on(every, STAGES, 1, staying)
+    return [c.candidates[0] for c in on]
 
 
 @pytest.mark.parametrize(("leaves", "count"), [(1.1, 4), (3.0, 15)], ids=["arrived", "on its way"])
