@@ -39,9 +39,8 @@ def coloured(beside: Trial, problem: Problem) -> Problem | None:
     if problem.imposed or problem.first.colour is not None or white(beside):
         return None
     posterior = problem.posterior_of(beside)
-    channels = _falling(posterior, beside.theta)
-    records = range(len(problem.records))
-    if not channels or not all(_uncorrelated(posterior, beside.theta, i, _ORDER, _STILL) for i in records):
+    channels = _remembering(posterior, beside.theta)
+    if not channels:
         return None
     loudest = max(_loudest(n, end) for n, end in zip(problem.records, problem.until, strict=True))
     other = problem.with_colour(posterior.colour(beside.theta, channels, loudest))
@@ -50,6 +49,14 @@ def coloured(beside: Trial, problem: Problem) -> Problem | None:
     if cost(posterior, beside.theta) - cost(again, theta) < THRESHOLDS.searched:
         return None
     return other if all(_uncorrelated(again, theta, index) for index in range(len(problem.records))) else None
+
+
+def _remembering(posterior: Posterior, theta: np.ndarray) -> list[int]:
+    """Channels whose innovations grow weaker towards high frequencies; none where a short memory leaves any channel's
+    correlated."""
+    channels, records = _falling(posterior, theta), range(len(posterior.records))
+    whitened = channels and all(_uncorrelated(posterior, theta, index, _ORDER, _STILL) for index in records)
+    return channels if whitened else []
 
 
 def _falling(posterior: Posterior, theta: np.ndarray) -> list[int]:
