@@ -6,6 +6,7 @@ products, of which there are as many as the springs, the dashpots and the consta
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import compress
 from typing import NamedTuple
 
@@ -119,15 +120,16 @@ class Regression:
         moves[chosen] = True
         return replace(self, moves=moves, missing=self.missing[::samples], basis=self.basis[::samples])
 
-    @property
+    @cached_property
     def wanted(self) -> Float[np.ndarray, "n dof"]:
         return self.missing / self.spread
 
-    @property
+    @cached_property
     def along(self) -> Float[np.ndarray, " dof"]:
         """What a force of the law is on each mass, in standard deviations of the missing one."""
         return direction(self.law.at, len(self.spread)) / self.spread
 
+    @cached_property
     def outside(self) -> Float[np.ndarray, "off told"]:
         """What makes inner products with what may be off into those with orthonormal forces that it spans."""
         flat = self.basis.reshape(-1, len(self.doubt))
@@ -137,9 +139,10 @@ class Regression:
         told = values > _ONE * values[-1]
         return vectors[:, told] / np.sqrt(values[told]) / scale[:, None]
 
-    def missing_of(self, outside: np.ndarray) -> tuple[float, Float[np.ndarray, " told"]]:
+    @cached_property
+    def missing_outside(self) -> tuple[float, Float[np.ndarray, " told"]]:
         """Square of the missing force that what may be off leaves, and what of it that makes."""
-        taken = np.einsum("nd,ndo->o", self.wanted, self.basis) @ outside
+        taken = np.einsum("nd,ndo->o", self.wanted, self.basis) @ self.outside
         return float(np.sum(self.wanted**2) - taken @ taken), taken
 
     def columns(self, rows: list[dict[str, float]]) -> tuple[Float[np.ndarray, "rows n"], list[dict[str, float]]]:
@@ -155,7 +158,7 @@ class Regression:
     def linear(self, columns: Float[np.ndarray, "rows n"]) -> bool:
         """Whether springs, dashpots and constants make all of these forces, so that regression cannot tell."""
         moments = self.moments(columns)
-        own = moments.power - np.sum((moments.off @ self.outside()) ** 2, 1)
+        own = moments.power - np.sum((moments.off @ self.outside) ** 2, 1)
         return bool(np.all(own < _ALMOST_NONE * moments.power))
 
     def with_doubt(self, columns: Float[np.ndarray, "rows n"]) -> "Regression":
@@ -168,9 +171,8 @@ class Regression:
     def regressed(self, moments: Moments) -> tuple[float, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """What is missing outside of what may be off; how much of its square each column takes, with what factor; the
         power of columns outside, and what of them is made by what may be off."""
-        outside = self.outside()
-        left, missing = self.missing_of(outside)
-        taken = moments.off @ outside
+        left, missing = self.missing_outside
+        taken = moments.off @ self.outside
         power = np.maximum(moments.power - np.sum(taken**2, 1), 1e-300)
         alike = moments.wanted - taken @ missing
         size = alike / power

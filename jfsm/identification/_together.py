@@ -108,8 +108,7 @@ def _explaining(shapes: dict[int, _Shapes], pairs: Sequence[tuple[int, int]]) ->
     if not pairs:
         return []
     some = next(iter(shapes.values())).regression
-    outside = some.outside()
-    total, missing = some.missing_of(outside)
+    outside, (total, missing) = some.outside, some.missing_outside
     beside = {i: _outside(one, outside, missing) for i, one in shapes.items()}
     found = []
     for pair in pairs:
