@@ -48,21 +48,26 @@ def coloured(beside: Trial, problem: Problem) -> Problem | None:
     theta = again.at_the_floor(beside.theta)
     if cost(posterior, beside.theta) - cost(again, theta) < THRESHOLDS.searched:
         return None
-    return other if all(_uncorrelated(again, theta, index) for index in range(len(problem.records))) else None
+    return other if _uncorrelated(again, _innovations(again, theta)) else None
+
+
+def _innovations(posterior: Posterior, theta: np.ndarray) -> list[np.ndarray]:
+    """Those of every record (until, channels), in their standard deviations."""
+    return [standardised(posterior, theta, index) for index in range(len(posterior.records))]
 
 
 def _remembering(posterior: Posterior, theta: np.ndarray) -> list[int]:
     """Channels whose innovations grow weaker towards high frequencies; none where a short memory leaves any channel's
     correlated."""
-    channels, records = _falling(posterior, theta), range(len(posterior.records))
-    whitened = channels and all(_uncorrelated(posterior, theta, index, _ORDER, _STILL) for index in records)
-    return channels if whitened else []
+    errors = _innovations(posterior, theta)
+    channels = _falling(errors)
+    unforeseen = [np.column_stack([_unforeseen(one, _ORDER) for one in error.T]) for error in errors]
+    return channels if channels and _uncorrelated(posterior, unforeseen, _STILL) else []
 
 
-def _falling(posterior: Posterior, theta: np.ndarray) -> list[int]:
+def _falling(errors: list[np.ndarray]) -> list[int]:
     """Channels whose innovations grow weaker towards high frequencies, by the upper part of their spectra."""
-    records = range(len(posterior.records))
-    falls = sum(np.array([rolloff(y).nats for y in standardised(posterior, theta, i).T]) for i in records)
+    falls = sum(np.array([rolloff(y).nats for y in error.T]) for error in errors)
     return np.flatnonzero(falls > _FALLS).tolist()
 
 
@@ -81,21 +86,21 @@ def _loudest(nuisances: Nuisances, until: int) -> float:
     return most
 
 
-def _uncorrelated(posterior: Posterior, theta: np.ndarray, index: int, order: int = 0, much: float = 1.0) -> bool:
-    """Whether the innovations of every channel are uncorrelated over half a period, but for so many times what counts
-    as chance; with an `order`, what is left of them once each is foretold from so many before.
+def _uncorrelated(posterior: Posterior, errors: list[np.ndarray], much: float = 1.0) -> bool:
+    """Whether the errors of every record and channel are uncorrelated over half a period, but for so many times what
+    counts as chance.
 
     References
     ----------
     G. M. Ljung, G. E. P. Box, Biometrika 65 (1978) 297.
     """
-    nuisances, until, error = posterior.records[index], posterior.until[index], standardised(posterior, theta, index)
-    lags = int(np.clip(nuisances.period / nuisances.record.dt / 2, *_LAGS))
-    if order:
-        error = np.column_stack([_unforeseen(one, order) for one in error.T])
-    total = np.maximum(np.sum(error**2, 0), np.finfo(float).tiny)
-    power = sum((np.sum(error[k:] * error[:-k], 0) / total) ** 2 for k in range(1, lags + 1)) - lags / until
-    return bool(np.all(power < much * max(_CORRELATED, _CHANCE * np.sqrt(2 * lags) / until)))
+    for nuisances, until, error in zip(posterior.records, posterior.until, errors, strict=True):
+        lags = int(np.clip(nuisances.period / nuisances.record.dt / 2, *_LAGS))
+        total = np.maximum(np.sum(error**2, 0), np.finfo(float).tiny)
+        power = sum((np.sum(error[k:] * error[:-k], 0) / total) ** 2 for k in range(1, lags + 1)) - lags / until
+        if not np.all(power < much * max(_CORRELATED, _CHANCE * np.sqrt(2 * lags) / until)):
+            return False
+    return True
 
 
 def _unforeseen(error: np.ndarray, order: int) -> np.ndarray:
