@@ -157,6 +157,31 @@ class State(NamedTuple):
         return Motion(self.x, self.v, self.z, self.mode.astype(self.x.dtype))
 
 
+class Passage(NamedTuple):
+    """How a lane went through a sample: what was `seen` of it, its motion as predicted and as `read`, and what became
+    of a small change.
+
+    `rows` (channels, state) are derivatives of the readings by all states, the zeros last, each at what the channels
+    before have left; `gains` (channels, state) what an innovation moves, `step` (state, state) what becomes of a change
+    from the sample to the next.
+    """
+
+    seen: Innovations
+    predicted: Motion
+    read: Motion
+    rows: Float[Array, "channels state"]
+    gains: Float[Array, "channels state"]
+    step: Float[Array, "state state"]
+
+
+class _Told(NamedTuple):
+    """What the readings of a sample told: as in `Passage`."""
+
+    seen: Innovations
+    rows: Float[Array, "channels state"]
+    gains: Float[Array, "channels state"]
+
+
 class Assumed(eqx.Module):
     """What a lane takes for granted about noise.
 
@@ -279,10 +304,23 @@ def run(
     of_zeros, alone = zeros_of(assumed), on_lanes(plants).first()
 
     def loop(plants, known, observation, dt, states, stretch):
-        return jax.lax.scan(partial(_sample, on_lanes(plants), known, observation, of_zeros, dt), states, stretch)
+        def sample(states, now):
+            states, passage = _sample(on_lanes(plants), known, observation, of_zeros, dt, states, now)
+            return states, passage.seen
+
+        return jax.lax.scan(sample, states, stretch)
 
     run_all = as_one_kernel(loop) if one_kernel and few_states(alone, of_zeros) else loop
     return run_all(plants, on_lanes(plants)(Known.of, assumed), observation, dt, states, stretch)
+
+
+def passages(
+    plants: Plant, assumed: Assumed, observation: Observation, stretch: Stretch, dt, states: State
+) -> tuple[State, Passage]:
+    """As `run`, with all of every sample's `Passage` (n, lanes, ...)."""
+    each = on_lanes(plants)
+    sample = partial(_sample, each, each(Known.of, assumed), observation, zeros_of(assumed), dt)
+    return jax.lax.scan(sample, states, stretch)
 
 
 def few_states(plant: Plant, zeros: tuple[int | None, ...]) -> bool:
@@ -290,10 +328,8 @@ def few_states(plant: Plant, zeros: tuple[int | None, ...]) -> bool:
     return 2 * plant.dof + plant.hidden + len(zeros) <= _FEW and plant.elementary
 
 
-def _sample(
-    each: Lanes, known: Known, observation, of_zeros, dt, states: State, now: Stretch
-) -> tuple[State, Innovations]:
-    """States of all lanes after a sample, and its innovations."""
+def _sample(each: Lanes, known: Known, observation, of_zeros, dt, states: State, now: Stretch) -> tuple[State, Passage]:
+    """States of all lanes after a sample, and how they went through it."""
     force, base = jnp.moveaxis(now.force, 1, 0), now.base  # (lanes, halves, dof)
     substeps = (base.size - 1) // 2
 
@@ -302,15 +338,16 @@ def _sample(
         load = Load(g[:3], base[:3], now.time, dt / substeps)
         return (*_read(plant, known, observation, of_zeros, state, load, before, now.values, now.use), g)
 
-    motion, updated, zeros, buffer, seen, g = each(read, known, states, force, now.before)
+    motion, updated, zeros, buffer, told, g = each(read, known, states, force, now.before)
     after = _advanced(each, known, motion, g, base, now.time, dt)
 
     def carry_on(plant, known, motion, after, updated, g):
         return _carried_on(plant, known, motion, after, updated, g[substeps], now.time, dt, substeps)
 
-    covariance, overrun = each(carry_on, known, motion, after, updated, g)
+    covariance, overrun, step = each(carry_on, known, motion, after, updated, g)
     zeros = each(lambda plant, known, zeros: jnp.sum(known.transition * zeros[None, :], 1), known, zeros)
-    return State(*after[:3], after.mode.astype(int), buffer, covariance, overrun, zeros), seen
+    passage = Passage(told.seen, states.motion, motion, told.rows, told.gains, step)
+    return State(*after[:3], after.mode.astype(int), buffer, covariance, overrun, zeros), passage
 
 
 def _advanced(each: Lanes, known: Known, motion: Motion, g, base, time, dt) -> Motion:
@@ -339,7 +376,7 @@ def _advanced(each: Lanes, known: Known, motion: Motion, g, base, time, dt) -> M
 
 
 def _read(plant: Plant, known: Known, observation, of_zeros, state: State, load: Load, before, values, use):
-    """Motion, covariance, zeros and buffer of a lane once it has read a sample, and the innovations."""
+    """Motion, covariance, zeros and buffer of a lane once it has read a sample, and what that told."""
     motion, dof, rows = state.motion, plant.dof, plant.friction.direction
     mean, updated, found = _update(
         plant, known.minv, observation, motion, state.zeros, of_zeros, state.covariance, state.overrun, load, before,
@@ -355,13 +392,15 @@ def _read(plant: Plant, known: Known, observation, of_zeros, state: State, load:
 
 
 def _carried_on(plant: Plant, known: Known, motion: Motion, after: Motion, updated, g, time, dt, substeps: int):
-    """Covariance of a lane after a sample, and how surely links rest by then; `g` drives it halfway."""
+    """Covariance of a lane after a sample, how surely links rest by then, and what becomes of a small change; `g`
+    drives it halfway."""
     x, v, z = ((a + b) / 2 for a, b in zip(motion[:3], after[:3], strict=True))
     free, rates = linearised(plant, known.minv, x, v, z, g, time + dt / 2)
     step = beside(_transition(plant, known.minv, motion, after, rates, dt, substeps), known.transition)
     moving = _product(_product(step, updated), step.T) + beside(known.added, known.process_noise)
     slope = with_friction(plant, known.minv, x, v, motion.mode, free, time + dt / 2)[0]
-    return _rest(plant, known.minv, moving, after.mode), _overrun(plant, motion, after, moving, slope, dt)
+    overrun = _overrun(plant, motion, after, moving, slope, dt)
+    return _rest(plant, known.minv, moving, after.mode), overrun, step
 
 
 def innovations(
@@ -483,8 +522,8 @@ def _overrun(plant, before: Motion, after: Motion, covariance, slope, dt):
 def _update(
     plant, minv, observation, motion: Motion, zeros, of_zeros, covariance, overrun, load: Load, before, y, use,
     variances, nothing,
-) -> tuple[Float[Array, " state"], Float[Array, "state state"], Innovations]:  # fmt: skip
-    """State after the readings of one sample, and their innovations; `overrun` tells how surely links rest, `load` is
+) -> tuple[Float[Array, " state"], Float[Array, "state state"], "_Told"]:  # fmt: skip
+    """State after the readings of one sample, and what they told; `overrun` tells how surely links rest, `load` is
     that of the sample's first step, `before` what drove it earlier, and speeds of links up to `nothing` are none."""
     at_first = jnp.concatenate([motion.x, motion.v, motion.z])
     mean, size = jnp.concatenate([at_first, zeros]), at_first.size
@@ -492,7 +531,7 @@ def _update(
         (channel, *_late(plant, minv, observation, tau, at_first, motion.mode, load, drive[:, :-1], drive[:, -1]))
         for tau, channel, drive in zip(plant.channel_delay, plant.late_channel, before, strict=True)
     ]
-    errors, spreads, shares = [], [], []
+    readings = list[tuple]()
     for c in range(y.shape[0]):
         gain, mine = 1.0 + plant.channel_gain[c], jnp.array([float(channel == c) for channel in of_zeros])
         reading = y[c] - jnp.sum(mine * mean[size:])
@@ -506,11 +545,10 @@ def _update(
             share = jnp.where(channel == c, 0.0, share)
         error = reading - gain * predicted - plant.channel_offset[c]
         row = jnp.concatenate([gain * row, mine])
-        mean, covariance, spread, _ = measurement_update(mean, covariance, row, error, variances[c], use[c])
-        errors.append(error)
-        spreads.append(spread)
-        shares.append(share)
-    return mean, covariance, Innovations(jnp.stack(errors), jnp.stack(spreads), jnp.stack(shares))
+        mean, covariance, spread, by_error = measurement_update(mean, covariance, row, error, variances[c], use[c])
+        readings.append((error, spread, share, row, by_error))
+    error, spread, share, rows, gains = (jnp.stack(each) for each in zip(*readings, strict=True))
+    return mean, covariance, _Told(Innovations(error, spread, share), rows, gains)
 
 
 def _predict(plant, minv, observation, c, mean, covariance, mode, overrun, load: Load, y, use, variance, gain, nothing):
@@ -546,11 +584,16 @@ def _late(plant, minv, observation, tau, mean, mode, load: Load, force, base):
         now = Motion(mean[:dof], mean[dof : 2 * dof], mean[2 * dof :], mode)
         then = advance_sample(plant, minv, now, g, base, load.time, -tau)
         a = acceleration(plant, minv, *then, g[-1], load.time - tau)[0]
-        shown = {"displacement": then.x, "velocity": then.v, "acceleration": a + base[-1]}
-        rows = zip(observation.select, observation.kinds, strict=True)
-        return jnp.stack([jnp.sum(row * shown[kind]) for row, kind in rows])
+        return shown(observation, then, a + base[-1])
 
     return jax.vmap(lambda e: jax.jvp(readings, (mean,), (e,)), out_axes=(None, 1))(jnp.eye(mean.size))
+
+
+def shown(observation: Observation, motion: Motion, a: Float[Array, " dof"]) -> Float[Array, " channels"]:
+    """What the channels show of a motion and its accelerations `a`, without gains and offsets."""
+    values = {"displacement": motion.x, "velocity": motion.v, "acceleration": a}
+    rows = zip(observation.select, observation.kinds, strict=True)
+    return jnp.stack([jnp.sum(row * values[kind]) for row, kind in rows])
 
 
 def _moving_in(plant, minv, mean, mode, load: Load, free, rates):

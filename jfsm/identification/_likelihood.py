@@ -114,8 +114,7 @@ def value_and_slopes(
     with np.errstate(all="ignore"):
         root = np.sqrt(use)
         standard = root / np.sqrt(base.variance)
-        normal = 0.5 * (base.error**2 / base.variance + np.log(2 * np.pi * base.variance))
-        value = float(np.sum(use * (normal - base.log_share)))
+        value = float(np.sum(use * (minus_log_density(base.error, base.variance) - base.log_share)))
         mixed = bool(np.any(base.log_share))
 
         def changes(lanes: Any, nudge: float) -> list[np.ndarray]:
@@ -131,6 +130,11 @@ def value_and_slopes(
             for mine, other in zip(slopes, back, strict=True):
                 mine[jumped] = np.where(np.abs(other) < np.abs(mine[jumped]), other, mine[jumped])
     return Slopes(value, root, base.error * standard, slopes[0], slopes[1], slopes[2] if mixed else None)
+
+
+def minus_log_density(error: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    """Minus the logarithm of the normal density of errors about zero."""
+    return 0.5 * (error**2 / variance + np.log(2 * np.pi * variance))
 
 
 class Runs(NamedTuple):
@@ -283,6 +287,21 @@ def _run(
 
     `leaves` and `static` are a plant, `Noise` and an `Observation`.
     """
+    plants, assumed, observation, state = lanes_of(static, leaves, numbers, velocity, dt, stretch, state, first)
+    return run(plants, assumed, observation, stretch, dt, state, one_kernel=one_kernel)
+
+
+def lanes_of(
+    static: Any,
+    leaves: list[Array],
+    numbers: Float[Array, "lanes size"],
+    velocity: Float[Array, "lanes dof dof"],
+    dt: Float[Array, ""],
+    stretch: Stretch,
+    state: State,
+    first: Bool[Array, ""],
+) -> tuple[Plant, Assumed, Observation, State]:
+    """Plants, noise and states of all lanes before a stretch, and what is observed; arguments as of a run."""
     plant, noise, observation = jax.tree.unflatten(static, leaves)
     floats, fixed = eqx.partition(plant, eqx.is_inexact_array)
 
@@ -301,8 +320,7 @@ def _run(
 
         return on_lanes(plants)(one, assumed, x0, v0, force)
 
-    state = jax.lax.cond(first, begin, lambda: state)
-    return run(plants, assumed, observation, stretch, dt, state, one_kernel=one_kernel)
+    return plants, assumed, observation, jax.lax.cond(first, begin, lambda: state)
 
 
 def tail_of(plant: Plant, numbers, channels: int):

@@ -15,6 +15,8 @@ LADDER = (1.0, 0.3, 0.1, 0.03, 0.01)
 """Shares of unmodelled force that the first rungs forgive: the top ones compare forces and have wide basins."""
 _LAST_RUNG = 0.003
 _RUNG_STEPS, _LAST_RUNG_STEPS, _RUNG_ENOUGH = 3, 10, 0.5
+_LAST_STEPS = 8
+"""Steps by exact slopes, at most, from where those along a run lead."""
 _ENOUGH = 0.01
 """A step that promises less than this many nats is the last,"""
 _HOPELESS = 0.02
@@ -25,6 +27,8 @@ _ROUNDS = 8
 """Most times that a climb gets its steps; in as many again it must promise to reach the best value known,"""
 _WORTH = 8.0
 """or to gain so many nats."""
+_LOST = 50.0
+"""Nats for each sample from which a hypothesis is no explanation, wherever its top is: it gets its steps once."""
 _WALL = 1e-3
 """Damping of a step that is to come down from the wall of a valley, not to go along it."""
 _LONGEST = 1.0
@@ -93,13 +97,31 @@ def finish(
     theta = start.theta
     if not limit.over:
         theta = _climb(posterior, theta, _LAST_RUNG, _RUNG_STEPS, _RUNG_ENOUGH, limit=limit).theta
-    found = _climb(posterior, theta, 0.0, steps, _ENOUGH, best, limit=limit)
+    if not posterior.has_tangents:
+        return _up(posterior, theta, steps, _ENOUGH, best, limit, exact=True)
+    near = _up(posterior, theta, steps, _RUNG_ENOUGH, best, limit, exact=False)
+    return _climb(posterior, near.theta, 0.0, _LAST_STEPS, _ENOUGH, min(best, float(np.min(near.value))), limit=limit)
+
+
+def _up(
+    posterior: Posterior,
+    theta: Float[np.ndarray, "lanes unknowns"],
+    steps: int,
+    enough: float,
+    best: float,
+    limit: Limit,
+    exact: bool,
+) -> Maximum:
+    """Climb with the true noise, as long as it promises something."""
+    found = _climb(posterior, theta, 0.0, steps, enough, best, limit=limit, exact=exact)
     for _ in range(_ROUNDS - 1):
         before = found.value
         if limit.over or not any(one is Result.maximum_steps for one in found.results):
             break
+        if np.min(before) > _LOST * posterior.samples:
+            break
         best = min(best, float(np.min(before)))
-        found = _climb(posterior, found.theta, 0.0, steps, _ENOUGH, best, limit=limit)
+        found = _climb(posterior, found.theta, 0.0, steps, enough, best, limit=limit, exact=exact)
         if np.all(before < found.value + np.maximum(found.value - best, _WORTH) / _ROUNDS):
             break
     return found
@@ -138,6 +160,7 @@ def _climb(
     best: float = np.inf,
     first: bool = False,
     limit: Limit = UNLIMITED,
+    exact: bool | None = None,
 ) -> Maximum:
     """The top from `theta` by damped steps, or past its `limit` how far they came.
 
@@ -149,7 +172,8 @@ def _climb(
     high = np.array([[u.high for u in row] for row in unknowns])
     log = np.array([[u.log or u.path.startswith("noise@") for u in row] for row in unknowns])
     lanes = theta.shape[0]
-    here = _Place(theta, *_finite(posterior.evaluate(theta, slack, first)))
+    exact = slack == 0.0 if exact is None else exact
+    here = _Place(theta, *_finite(posterior.evaluate(theta, slack, first, exact=exact)))
     beyond, astray = here, np.zeros(lanes, bool)
     damp = np.full(lanes, 1e-3)
     open_, results = np.ones(lanes, bool), [Result.maximum_steps] * lanes
@@ -172,7 +196,7 @@ def _climb(
         if not np.any(open_) or (step >= last and not np.any(open_ & (here.value < reached))):
             break
         trial = np.where(open_[:, None], start.theta + move, here.theta)
-        there = _Place(trial, *_finite(posterior.evaluate(trial, slack, first, open_)))
+        there = _Place(trial, *_finite(posterior.evaluate(trial, slack, first, open_, exact=exact)))
         better = open_ & (there.value < here.value)
         failed = open_ & ~better & (astray | (damp >= _WALL) | ~np.isfinite(there.value))
         astray = open_ & ~better & ~failed

@@ -17,6 +17,7 @@ from ..plant import (
     Observation,
     Path,
     Reconstruction,
+    Swing,
     bucket,
     check_pair,
     excitation,
@@ -113,6 +114,8 @@ class Nuisances:
         Share of the elastic force that no hypothesis has to explain: what all of them lack.
     colour : Colour or None
         Memory of the channels' noise, where it is known to have one.
+    swing : Swing or None
+        The motion of several masses, where it has been estimated.
     late : dict
         How late [s] channels of the force were that are in time here, by (kind, degree of freedom).
     stretches : dict
@@ -144,6 +147,7 @@ class Nuisances:
     path: Path | None = None
     forgiven: float = 0.0
     colour: Colour | None = None
+    swing: Swing | None = None
     late: Mapping[Channel, float] = field(default_factory=dict)
     stretches: dict[int, Stretch] = field(default_factory=dict, init=False, repr=False)
     _heads: dict[int, tuple[Imposed, Readings]] = field(default_factory=dict, init=False, repr=False)
@@ -280,8 +284,11 @@ class Nuisances:
 
     def steps_for(self, structures: Sequence[Structure]) -> int:
         """Steps per sample that are short enough for all of these structures."""
-        size, needed = typical_size(self.record), substeps_for if self.path is None else imposed_substeps
-        return max(needed(structure, self.record.dt, size) for structure in structures)
+        if self.path is not None:
+            size = typical_size(self.record)
+            return max(imposed_substeps(structure, self.record.dt, size) for structure in structures)
+        size = typical_size(self.record) if self.swing is None else self.swing
+        return max(substeps_for(structure, self.record.dt, size) for structure in structures)
 
     def resolving(self, structures: Sequence[Structure], least: int = 1) -> "Nuisances":
         """The same record with steps short enough for all of these structures, so many per sample at `least`."""

@@ -18,6 +18,7 @@ from ._layout import plant_rows, plant_vector
 from ._likelihood import Runs, Scene, Slopes, innovations_of, value_and_slopes
 from ._linear_lanes import is_linear, linear_innovations
 from ._nuisances import Nuisances
+from ._tangents import NUDGE, has_tangents, slopes_along
 from ._unknowns import Unknown, values_of
 
 LANES = 2
@@ -80,6 +81,12 @@ class Posterior:
         leaves, tree = jax.tree.flatten([parts[0].plant for parts in self._parts])
         return tree, tuple(leaf.shape for leaf in leaves), self.records[0].readings.zeros
 
+    @property
+    def has_tangents(self) -> bool:
+        """Whether slopes along one run pay."""
+        scenes = (parts[0].scene(n, n.samples) for parts, n in zip(self._parts, self.records, strict=True))
+        return any(has_tangents(scene) and not is_linear(scene) for scene in scenes)
+
     def initial(self) -> Float[np.ndarray, "lanes unknowns"]:
         """Starting values (lanes, unknowns)."""
         return np.array([[u.theta for u in unknowns] for unknowns in self.hypothesis.unknowns])
@@ -90,6 +97,8 @@ class Posterior:
         slack: float = 0.0,
         first: bool = False,
         lanes: Bool[np.ndarray, " lanes"] | None = None,
+        *,
+        exact: bool = True,
     ) -> tuple[
         Float[np.ndarray, " lanes"], Float[np.ndarray, "lanes unknowns"], Float[np.ndarray, "lanes unknowns unknowns"]
     ]:
@@ -97,7 +106,7 @@ class Posterior:
 
         `slack` is the share of unmodelled force forgiven, no less than the record's own; of every record only its
         `first` readings count, as many as lead to a basin, where these are asked for. Of `lanes` that are not asked for
-        (lanes,) the value is infinite.
+        (lanes,) the value is infinite. Slopes that need not be `exact` are those along one run, where that pays.
         """
         count, size = theta.shape
         value, gradient, information = np.zeros(count), np.zeros((count, size)), np.zeros((count, size, size))
@@ -108,7 +117,7 @@ class Posterior:
             value[lane], gradient[lane], curvature = prior(self.hypothesis.unknowns[lane], theta[lane])
             information[lane] = np.diag(curvature)
             for index, part in enumerate(self._parts):
-                found, mine = self._slopes(theta[lane], index, lane, slack, first), part[lane].mine
+                found, mine = self._slopes(theta[lane], index, lane, slack, first, exact), part[lane].mine
                 value[lane] += found.value
                 gradient[lane, mine] += found.gradient
                 information[lane][np.ix_(mine, mine)] += found.information
@@ -149,6 +158,11 @@ class Posterior:
             yield seen, np.asarray(nuisances.readings.use)[:until]
 
     @property
+    def samples(self) -> int:
+        """Samples of all records that count."""
+        return sum(self.until)
+
+    @property
     def leading(self) -> int:
         """Samples of all records that lead to a basin."""
         return sum(self._until(index, first=True) for index in range(len(self.records)))
@@ -165,11 +179,17 @@ class Posterior:
                 total[lane][np.ix_(part.mine, part.mine)] += self._slopes(theta[lane], index, lane).scatter
         return total
 
-    def _slopes(self, theta: np.ndarray, index: int, lane: int, slack: float = 0.0, first: bool = False) -> Slopes:
+    def _slopes(
+        self, theta: np.ndarray, index: int, lane: int, slack: float = 0.0, first: bool = False, exact: bool = True
+    ) -> Slopes:
         """What the readings of record `index` say of the unknowns that act on it."""
         nuisances, until = self.records[index], self._until(index, first)
         use, mine = np.asarray(nuisances.readings.use)[:until], self._parts[index][lane].mine
-        forgiven = max(slack, nuisances.forgiven)
+        forgiven, scene = max(slack, nuisances.forgiven), self._parts[index][lane].scene(nuisances, until)
+        if not (exact or is_linear(scene)) and has_tangents(scene):
+            nudged = theta[mine] + NUDGE * np.eye(len(mine))
+            numbers = self._parts[index][lane].numbers(np.concatenate([theta[mine][None], nudged]))
+            return slopes_along(scene, numbers, slackened(nuisances, forgiven), use)
 
         def run(values: np.ndarray) -> Innovations:
             every = np.repeat(theta[None], len(values), 0)

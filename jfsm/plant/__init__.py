@@ -9,6 +9,7 @@ of one step and one sample serve filters. `imposed_motion` and `force_needed` ar
 from ._along import HIDDEN_SUBSTEPS as HIDDEN_SUBSTEPS
 from ._along import force_along as force_along
 from ._drive import Reconstruction as Reconstruction
+from ._excitation import Swing as Swing
 from ._excitation import bucket as bucket
 from ._excitation import excitation as excitation
 from ._excitation import fastest_mode as fastest_mode

@@ -15,7 +15,7 @@ from ..structures import Clipping, LinearDamping, LinearStiffness, Structure
 from ._drive import Reconstruction, reconstruct
 from ._forces import State, hidden_start
 from ._grid import InterpolatedInput
-from ._plant import Plant, numbers_of
+from ._plant import Plant, direction, numbers_of
 from ._stepper import inverse_mass, linearised
 
 _STEP_ANGLE = 0.22
@@ -52,6 +52,13 @@ class Size(NamedTuple):
     velocity: float
 
 
+class Swing(NamedTuple):
+    """Displacement and velocity (n, dof) of a motion that is known, if roughly: links move less than their ends."""
+
+    displacement: Float[np.ndarray, "n dof"]
+    velocity: Float[np.ndarray, "n dof"]
+
+
 _KINKED_SUBSTEPS = 2
 """Steps per sample at least for hidden states, which yield and slide at instants of their own."""
 _CREST = 4.0
@@ -84,11 +91,29 @@ def probes(dof: int, size: Size) -> Iterator[tuple[Float[np.ndarray, " dof"], Fl
             yield x * size.displacement * pattern, v * size.velocity * pattern, angle
 
 
-def substeps_for(structure: Structure, dt: float, size: Size | None = None) -> int:
+def probes_along(
+    swing: Swing, structure: Structure
+) -> Iterator[tuple[Float[np.ndarray, " dof"], Float[np.ndarray, " dof"], float]]:
+    """As `probes`, from a motion that is known: where the link of each nonlinear law is as stretched, or as fast."""
+    places = {term.at for term in structure.terms if not isinstance(term, LinearStiffness | LinearDamping)}
+    for row in (direction(at, structure.dof) for at in sorted(places)):
+        for x, v, angle in _PROBES:
+            yield _where(swing.displacement, row, x), _where(swing.velocity, row, v), angle
+
+
+def _where(states: Float[np.ndarray, "n dof"], row: Float[np.ndarray, " dof"], share: float) -> Any:
+    """State in which what a row selects is closest to so many root mean squares of it; the opposite one of those below
+    zero."""
+    along = states @ row
+    sample = np.argmin(np.abs(np.abs(along) - abs(share) * np.sqrt(np.mean(along**2))))
+    return states[sample] * np.sign(along[sample] * share)
+
+
+def substeps_for(structure: Structure, dt: float, size: Size | Swing | None = None) -> int:
     """Steps per sample, a power of two, that keep the angle per step of the fastest mode or decay small.
 
-    Nonlinear laws may be faster, at rest or in motions of about this `size`: bristles, steep regularised friction, a
-    hardening spring. For these the steps may be longer.
+    Nonlinear laws may be faster, at rest or in motions of about this `size`, or as they are: bristles, steep
+    regularised friction, a hardening spring. For these the steps may be longer.
 
     Raises
     ------
@@ -108,8 +133,10 @@ def substeps_for(structure: Structure, dt: float, size: Size | None = None) -> i
     if not len(plant.smooth) + len(plant.memory):
         return min(_MOST_SUBSTEPS, own)
     own = max(own, _KINKED_SUBSTEPS if len(plant.memory) else 1)
-    rates = ((_fastest_rate(plant, x, v), angle) for x, v, angle in probes(structure.dof, size or Size(0.0, 0.0)))
-    faster = max(1.0, *(rate * dt / angle / own for rate, angle in rates))
+    known = isinstance(size, Swing)
+    states = probes_along(size, structure) if known else probes(structure.dof, size or Size(0.0, 0.0))
+    rates = ((_fastest_rate(plant, x, v), angle) for x, v, angle in states)
+    faster = max([1.0, *(rate * dt / angle / own for rate, angle in rates)])
     return min(_MOST_STIFF_SUBSTEPS, own * _FINER ** math.ceil(math.log(faster, _FINER)))
 
 

@@ -1,11 +1,12 @@
 """What hypotheses are fitted to: a model, records of what it simulates, and how much of each is fitted."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 from ..._limit import UNLIMITED, Limit
 from ...identification import Colour, Hypothesis, Nuisances, Posterior, prepare_all
-from ...plant import Channel, Reconstruction
+from ...plant import Channel, Reconstruction, Swing
 from ...records import Record
 from ...structures import Structure
 from ..hypotheses.initial_values import Begin
@@ -50,6 +51,10 @@ class Problem(NamedTuple):
         prepared = prepare_all(records, self.model, self.first.reconstruction)
         both = zip(prepared, self.records, strict=True)
         return self._replace(records=[n.weighed(weighed).knowing(known) for n, known in both])
+
+    def moving(self, swing: Swing) -> "Problem":
+        """The same, it being known how the structure moves."""
+        return self._replace(records=[replace(n, swing=swing) for n in self.records])
 
     def knowing(self, other: "Problem") -> "Problem":
         """The same, with what another problem of the same channels tells of these."""

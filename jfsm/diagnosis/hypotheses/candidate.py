@@ -10,6 +10,9 @@ from .initial_values import Begin
 
 _FOLLOWED = 8
 """Laws that are fitted, the most promising ones."""
+_UNSEEN, _NEARLY = 0.5, 0.5
+"""Share of the missing force from which it is seen well; of one that is not those laws are fitted, too, that explain
+such a part of what the best does, at its place."""
 _HARDLY_LESS = 0.8
 """Share of what a law explains of the missing force, from which another may be as likely: regression is not the fit."""
 
@@ -31,8 +34,8 @@ class Candidate:
 
 def promising(tried: Sequence[Candidate]) -> tuple[list[Candidate], list[Candidate]]:
     """Candidates that are worth a fit, and those that are not: laws that explain least of the missing force."""
-    least = _least_share(tried)
-    chosen = [c for c in tried if c.starts and (c.share is None or c.share >= least)]
+    least, near = _least_share(tried), _near_the_best(tried)
+    chosen = [c for c in tried if c.starts and (c.share is None or c.share >= least or c.effects in near)]
     fitted = {c.effects for c in chosen}
     return chosen, [c for c in tried if c.effects not in fitted]
 
@@ -45,6 +48,15 @@ def _least_share(tried: Sequence[Candidate]) -> float:
             shares[c.effects] = max(c.share, shares.get(c.effects, -math.inf))
     ranked = sorted(shares.values(), reverse=True)
     return ranked[_FOLLOWED - 1] if len(ranked) > _FOLLOWED else -math.inf
+
+
+def _near_the_best(tried: Sequence[Candidate]) -> set[tuple[Effect, ...]]:
+    """Laws at the place of the one that explains most, and about as much, of a force that is not seen well."""
+    best = max((c for c in tried if c.share is not None), key=lambda c: c.share or 0.0, default=None)
+    if best is None or not best.share or best.share >= _UNSEEN:
+        return set()
+    there = [c for c in tried if [e.at for e in c.effects] == [e.at for e in best.effects]]
+    return {c.effects for c in there if (c.share or 0.0) >= _NEARLY * best.share}
 
 
 def contained(laws: Sequence[AbstractTerm], among: Sequence[Candidate]) -> list[Candidate]:

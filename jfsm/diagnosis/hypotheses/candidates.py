@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from itertools import chain
 
 from ..._threads import side_by_side
+from ...estimation import Latent
 from ...identification import Nuisances
 from ...structures import (
     AccelerationBias,
@@ -59,13 +60,17 @@ def candidates(
     records: Sequence[Nuisances],
     selection: Mapping[str, Cause],
     places: Sequence[tuple] | None = None,
+    missing: Latent | None = None,
 ) -> list[Candidate]:
-    """Every cause of `selection` at every place: laws on links or masses, sensor effects on the channels."""
+    """Every cause of `selection` at every place: laws on links or masses, sensor effects on the channels.
+
+    Laws are placed by the force `missing` in the first record, which is estimated where it is not known.
+    """
     first = records[0]
     fitted = _fitted(selection, imposed=first.path is not None)
     laws = [Effect(cause, at) for cause in fitted if not cause.is_sensor for at in _links(cause, model, places)]
     faults = [Effect(cause, at) for cause in fitted if cause.is_sensor for at in _channels(cause, model, records)]
-    placed = chain.from_iterable(side_by_side(Laws(model, first).of, laws)) if laws else ()
+    placed = chain.from_iterable(side_by_side(Laws(model, first, missing).of, laws)) if laws else ()
     return [*placed, *(Candidate((fault,), natural_starts(model, *fault, first)) for fault in faults)]
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import equinox as eqx
 import numpy as np
 
+from ...estimation import Latent
 from ...identification import (
     LANES,
     Nuisances,
@@ -58,9 +59,9 @@ def at_rest(at: tuple, rest: float) -> dict[tuple[str, int | None], Start]:
 class Laws:
     """Laws placed where they explain most of what a structure lacks."""
 
-    def __init__(self, structure: Structure, nuisances: Nuisances):
+    def __init__(self, structure: Structure, nuisances: Nuisances, missing: Latent | None = None):
         self.structure, self.nuisances, self.scale = structure, nuisances, scale_of(nuisances, structure)
-        self.missing = missing_force(structure, nuisances)
+        self.missing = missing_force(structure, nuisances) if missing is None else missing
 
     def placed(self, effect: Effect, others: Sequence[AbstractTerm] = ()) -> list[Placed]:
         """Shapes of a law that explain most; the sizes of `others`, which the structure has, are free as well."""

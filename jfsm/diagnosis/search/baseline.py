@@ -9,6 +9,7 @@ from ..._threads import side_by_side
 from ...identification import LADDER, Maximum, Posterior, approach, finish, lanes_of
 from ...structures import Structure
 from ..evidence.fitted import Trial, trial
+from ..evidence.own_values import at_bounds
 from ..evidence.setup import Problem
 from ..hypotheses.initial_values import found_in, own_part
 
@@ -59,15 +60,16 @@ def believed(problem: Problem, near: Trial | None = None) -> tuple[Problem, Tria
     if near is None:
         given, refitted = fit_model(problem)
         near = refitted
-        if not _outweighed(problem.model, near.structure):
+        if not _outweighed(problem.model, near):
             return problem, given, refitted
-    if _outweighed(problem.model, near.structure):
+    if _outweighed(problem.model, near):
         # The noise of the force acts through the mass, and all hypotheses share one noise: that of the likelier mass.
         problem = problem.weighed(near.structure)
     return problem, *fit_model(problem, near=near)
 
 
-def _outweighed(model: Structure, refitted: Structure) -> bool:
-    """Whether a refit moves any mass by more than some per cent."""
-    stated, found = (np.asarray(s.mass) for s in (model, refitted))
-    return bool(np.any(np.abs(found - stated) > _HEAVIER * np.abs(stated)))
+def _outweighed(model: Structure, refitted: Trial) -> bool:
+    """Whether a refit moves any mass by more than some per cent; one with values at their bounds lacks something, and
+    its masses tell nothing."""
+    stated, found = (np.asarray(s.mass) for s in (model, refitted.structure))
+    return bool(np.any(np.abs(found - stated) > _HEAVIER * np.abs(stated))) and not at_bounds(refitted)

@@ -22,9 +22,11 @@ _BLIND = 10.0
 evidence."""
 _ARRIVED = 2.0
 """Mean square of innovations, in their variances, up to which a leader leaves hardly more than noise."""
-_HOPELESS_START = 50.0
+_HOPELESS = 50.0
 """Nats for each sample behind another start of the same candidates, after the same stage, from which a start is not
-pursued."""
+pursued;"""
+_TELLING = 0.03
+"""nor is it behind any other, once no more than such a share of the force is forgiven."""
 _FIRST = 2
 """Leaders whose tops are known before the others go on."""
 
@@ -85,8 +87,9 @@ def _through_stages(batches: Sequence[Batch], schedule: Schedule, kept: Sequence
 def _going_on(pursued: Sequence[Batch], schedule: Schedule, stage: int, kept: Sequence[Batch]) -> list[Batch]:
     """Those that go on to this stage. Once one has arrived the others cannot be far likelier: of those far behind only
     the laws that are kept go on."""
-    pursued, least, staying = _hopeful(pursued), schedule.going_on(len(pursued)), list(kept)
-    if _arrived(pursued, schedule.ladder[stage - 1]):
+    share, staying = schedule.ladder[stage - 1], list(kept)
+    pursued, least = _hopeful(pursued, share), schedule.going_on(len(pursued))
+    if _arrived(pursued, share):
         least, staying = _ALWAYS_PURSUED, [batch for batch in kept if math.isfinite(batch.share)]
     near = _near(pursued, least)
     return [batch for batch in pursued if batch in near or batch in staying]
@@ -98,12 +101,14 @@ def _arrived(pursued: Sequence[Batch], share: float) -> bool:
     return leader is not None and not leader.limit.over and leader.misfit(share) < _ARRIVED
 
 
-def _hopeful(pursued: Sequence[Batch]) -> list[Batch]:
-    """Those that are not far behind others of the same candidates, which began elsewhere."""
-    best = dict[tuple[Candidate, ...], float]()
+def _hopeful(pursued: Sequence[Batch], share: float) -> list[Batch]:
+    """Those that are not far behind others of the same candidates, which began elsewhere, nor behind any others where
+    such a share of the force, which is forgiven, tells."""
+    leader, best = min((batch.best for batch in pursued), default=math.inf), dict[tuple[Candidate, ...], float]()
     for batch in pursued:
         best[batch.candidates] = min(batch.best, best.get(batch.candidates, math.inf))
-    return [batch for batch in pursued if batch.best - best[batch.candidates] < _HOPELESS_START * batch.samples]
+    ahead = [leader if share <= _TELLING else best[batch.candidates] for batch in pursued]
+    return [b for b, reference in zip(pursued, ahead, strict=True) if b.best - reference < _HOPELESS * b.samples]
 
 
 def _at_their_tops(pursued: Sequence[Batch], best: float, tell: Tell) -> list[Trial]:

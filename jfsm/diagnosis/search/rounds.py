@@ -143,7 +143,8 @@ class Rounds:
     ) -> tuple[Found, list[Candidate]]:
         """What else is fitted. Once the best leaves only noise, that is what may be as good; else all of it that may be
         where the best is, since regression may put the right law last if the missing force is poorly seen."""
-        if not settled(self._apart_from_the_drive([self.given, self.refitted, *found.trials]), self._lack):
+        amid = amid_noise(self.given, self.refitted, found.trials, self.problem, self.key)[1]
+        if not settled(self._apart_from_the_drive(amid), self._lack):
             return found, self._there(found.trials, [*(c for c in others if c.starts), *slow])
         best = max(found.trials, key=lambda t: t.evidence)
         late, behind = self._not_far_behind(late, best)

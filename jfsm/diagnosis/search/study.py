@@ -8,8 +8,9 @@ import jax
 import numpy as np
 
 from ..._limit import Limit
-from ...identification import prepare_all
-from ...plant import Reconstruction
+from ...estimation import Latent
+from ...identification import missing_force, prepare_all
+from ...plant import Reconstruction, Swing
 from ...records import Record
 from ...structures import AttachedOscillator, Cause, DelayedForce, ForceDelay, Maxwell, Structure
 from ..channels.clock import WAYS, in_its_time
@@ -122,7 +123,8 @@ class Study:
         channel = wandering(refitted, problem, PLAINLY)
         if channel is not None:
             return self._sought_with(problem.with_wandering(channel), problem, given, refitted, known)
-        every = self._candidates(problem)
+        problem, missing = self._moving(problem)
+        every = self._candidates(problem, missing)
         rounds = Rounds(every, given, refitted, known, problem, self.steps, self.key, self.pairs)
         found, other = rounds.run()
         if other is None or self.limit.over:
@@ -130,10 +132,17 @@ class Study:
         studied = self._sought_with(other, problem, given, refitted, known)
         return (problem, every, found) if self.limit.over else studied
 
-    def _candidates(self, problem: Problem) -> list[Candidate]:
+    def _moving(self, problem: Problem) -> tuple[Problem, Latent | None]:
+        """The problem, knowing how several masses move, and the force that the model lacks; None where not asked."""
+        if self.model.dof == 1 or problem.imposed or all(cause.is_sensor for cause in self.chosen.values()):
+            return problem, None
+        missing = missing_force(self.model, steadied(problem.first))
+        return problem.moving(Swing(missing.displacement, missing.velocity)), missing
+
+    def _candidates(self, problem: Problem, missing: Latent | None = None) -> list[Candidate]:
         """What could be tried: not the delay of a force of which it is known."""
-        known = problem.first.late
-        return [c for c in self._possible(problem, self.chosen) if not (_delays_force(c) and c.effects[0].at in known)]
+        possible, known = self._possible(problem, self.chosen, missing), problem.first.late
+        return [c for c in possible if not (_delays_force(c) and c.effects[0].at in known)]
 
     def _delays(self, problem: Problem, other: Problem) -> list[Candidate]:
         """The delays of forces that could be tried in a problem, and not in another one that knows them."""
@@ -141,8 +150,8 @@ class Study:
         known = other.first.late.keys() - problem.first.late.keys()
         return [c for c in self._possible(problem, delays) if c.effects[0].at in known] if known and delays else []
 
-    def _possible(self, problem: Problem, chosen: dict[str, Cause]) -> list[Candidate]:
-        return candidates(self.model, [steadied(n) for n in problem.records], chosen, self.places)
+    def _possible(self, problem: Problem, chosen: dict[str, Cause], missing: Latent | None = None) -> list[Candidate]:
+        return candidates(self.model, [steadied(n) for n in problem.records], chosen, self.places, missing)
 
     def _lags(self, late: Studied, problem: Problem, given: Trial, refitted: Trial) -> bool:
         """Whether a law by which the structure lags is likelier than a late force beside the model, whatever was found
