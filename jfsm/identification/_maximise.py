@@ -28,7 +28,8 @@ _ROUNDS = 8
 _WORTH = 8.0
 """or to gain so many nats."""
 _LOST = 50.0
-"""Nats for each sample from which a hypothesis is no explanation, wherever its top is: it gets its steps once."""
+"""Nats for each sample from which a hypothesis is no explanation, wherever its top is: it gets its steps once. So far
+behind another start one gets none."""
 _WALL = 1e-3
 """Damping of a step that is to come down from the wall of a valley, not to go along it."""
 _LONGEST = 1.0
@@ -177,6 +178,9 @@ def _climb(
     beyond, astray = here, np.zeros(lanes, bool)
     damp = np.full(lanes, 1e-3)
     open_, results = np.ones(lanes, bool), [Result.maximum_steps] * lanes
+    if slack == 0.0 and np.isfinite(np.min(here.value)):
+        open_ = here.value <= np.min(here.value) + _LOST * posterior.samples
+        results = [Result.maximum_steps if is_open else Result.stalled for is_open in open_]
     last, reached = steps, np.inf
     for step in range(steps):
         if limit.over:

@@ -67,8 +67,8 @@ def slopes_along(
         value = float(np.sum(use * minus_log_density(error, variance)))
         by_spread = variance_by_noise @ scales.T * (root / variance)[:, :, None]
         by_error = by_error * standard[:, :, None]
-    rows = (np.moveaxis(a, 2, 0).reshape(many, -1) for a in (by_error, by_spread))
-    return Slopes(value, root.ravel(), (error * standard).ravel(), *rows, None)
+    by_error, by_spread = (np.moveaxis(a, 2, 0).reshape(many, -1) for a in (by_error, by_spread))
+    return Slopes(value, root.ravel(), (error * standard).ravel(), by_error, by_spread, None)
 
 
 def _filled(rows: np.ndarray) -> np.ndarray:
@@ -153,7 +153,8 @@ def _by_unknowns(static: Any, leaves, run, lot, dt, stretch: Stretch, passed: Pa
         """Readings at a sample, and the state at the next."""
         lane = with_vector(plant, row)
         minv, g = inverse_mass(lane), true_force(lane, force, base)
-        a = acceleration(lane, minv, *predicted, g[0], time)[0] + base[0]
+        x, v, z, mode = predicted
+        a = acceleration(lane, minv, x, v, z, mode, g[0], time)[0] + base[0]
         y = (1.0 + lane.channel_gain) * shown(observation, predicted, a) + lane.channel_offset
         return y, _flat(advance_sample(lane, minv, read, g, base, time, dt))
 
