@@ -151,3 +151,17 @@ def test_a_law_that_begins_in_several_places_takes_no_place_of_another():
     alone = [Candidate((effect,), (model,), 0.9 - 0.1 * i) for i, effect in enumerate(laws)]
     chosen, left = promising([*alone, *[Candidate((laws[0],), (model,), 0.9)] * 5])
     assert len({c.effects for c in chosen}) == 8 and [c.effects for c in left] == [(laws[8],)]
+
+
+@pytest.mark.parametrize(("best", "followed"), [(0.3, True), (0.9, False)], ids=["ill seen", "well seen"])
+def test_of_a_force_that_is_ill_seen_all_laws_are_followed_that_explain_about_as_much_at_its_place(best, followed):
+    laws = [Effect(cause, (1, 2)) for cause in list(jfsm.causes().values())[:10]]
+    model = jfsm.Structure.sdof(1.0, 1.0, 0.1)
+    leaders = [Candidate((effect,), (model,), best) for effect in laws[:8]]
+    near, less = (
+        Candidate((effect,), (model,), part * best) for effect, part in zip(laws[8:], (0.6, 0.4), strict=True)
+    )
+    elsewhere_ = Candidate((Effect(laws[8].cause, (0, 1)),), (model,), 0.6 * best)
+    chosen, _ = promising([*leaders, near, less, elsewhere_])
+    assert (near in chosen) == followed
+    assert less not in chosen and elsewhere_ not in chosen

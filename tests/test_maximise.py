@@ -97,3 +97,24 @@ def test_a_climb_whose_time_is_over_looks_once_more_at_most(after: int):
     start = Maximum(np.zeros(1), begin, np.zeros((1, 2, 2)), ())
     found = finish(valley, start, limit=limit)  # pyright: ignore[reportArgumentType]
     assert valley.asked <= after + 1 and not found.results[0].ok
+
+
+class Two(Valley):
+    """Two starts of the valley, the second one far up its wall."""
+
+    def evaluate(self, theta, slack=0.0, first=False, lanes=None, *, exact=True):
+        asked = [super(Two, self).evaluate(one[None], slack, first) for one in theta]
+        value, gradient, information = (np.concatenate(each) for each in zip(*asked, strict=True))
+        value = np.where(lanes, value, np.inf) if lanes is not None else value
+        self.second += 0 if lanes is None else int(lanes[1])
+        return value, gradient, information
+
+
+@pytest.mark.parametrize(("wall", "climbs"), [(0.1, True), (3.0, False)])
+def test_a_start_that_is_lost_behind_another_gets_no_steps(wall: float, climbs: bool):
+    two = Two(much=30.0)
+    two.second, two.hypothesis = 0, SimpleNamespace(unknowns=two.hypothesis.unknowns * 2)
+    begin = np.array([[-1.4, np.log(2 - np.exp(-1.4))], [wall, wall]])
+    found = _climb(two, begin, 0.0, 50, 1e-6)  # pyright: ignore[reportArgumentType]
+    assert found.results[0].ok and (two.second > 0) == climbs
+    assert climbs or found.results[1] is Result.stalled

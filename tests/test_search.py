@@ -528,3 +528,21 @@ def test_where_a_law_explains_half_others_are_looked_for_at_its_place_only(monke
     monkeypatch.setattr(rounds, "explained", lambda trial, refitted: share)
     found = rounds.Rounds._there(SimpleNamespace(refitted=None), [best], list(others.values()))  # type: ignore
     assert [name for name, one in others.items() if one in found] == (fitted or list(others))
+
+
+@pytest.mark.parametrize(("share", "goes_on"), [(0.3, True), (0.03, False)], ids=["forgiven", "told"])
+def test_what_is_hopeless_behind_the_leader_stops_where_little_force_is_forgiven(share: float, goes_on: bool):
+    climbers: Any = [Climber("leader", 0.0), Climber("sensor", 1e5)]
+    hopeful: Any = climbing._hopeful(climbers, share)
+    assert ("sensor" in [c.candidates[0] for c in hopeful]) == goes_on
+
+
+def test_a_search_has_settled_once_what_is_left_turns_out_to_be_noise(monkeypatch):
+    found = SimpleNamespace(trials=[SimpleNamespace(evidence=1.0, effects=(), laws=())], behind=[])
+    asked = []
+    monkeypatch.setattr(rounds, "amid_noise", lambda given, refitted, trials, *_: (None, ["amid", *trials]))
+    monkeypatch.setattr(rounds, "settled", lambda trials, lack: asked.append(trials))
+    search = SimpleNamespace(given="given", refitted="refitted", problem=None, key=None, _lack=None)
+    search._apart_from_the_drive, search._there = list, lambda trials, others: others
+    rounds.Rounds._worth_a_second_round(search, found, [], [], [], [])  # type: ignore
+    assert asked == [["amid", *found.trials]]
