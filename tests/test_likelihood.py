@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 import jfsm
+from jfsm.diagnosis.evidence.setup import Problem
 from jfsm.identification import (
     Hypothesis,
     Nuisances,
     Posterior,
     _likelihood,
+    beginnings,
     effect_unknown,
     interval,
     nuisance_unknowns,
@@ -404,3 +406,15 @@ def test_the_noise_of_the_force_moves_the_masses_that_a_record_is_weighed_with(s
     assert np.sum(seen.readings.variance < known.readings.variance) == 1  # that of the acceleration
     less = known.noise.velocity - seen.noise.velocity
     np.testing.assert_allclose(less, 0.75 * known.force_covariance * (DT / mass) ** 2, rtol=1e-9)
+
+
+def test_starts_of_a_law_that_sticks_begin_together_as_each_begins_alone():
+    time = np.arange(300) * 0.05
+    force, model = np.sin(1.3 * time), jfsm.Structure.sdof(1.0, 9.0, 0.3)
+    record = jfsm.Record(time, force, displacement=0.1 * np.sin(1.3 * time - 0.2), acceleration=-0.17 * np.sin(time))
+    laws = [jfsm.Coulomb(size, at=(0, 1)) for size in (0.05, 0.1, 0.2)]
+    problem = Problem(model, [prepare(record, model), prepare(record[:200], model)], [250, 200])
+    posteriors = [problem.posterior([model + law]) for law in laws]
+    alone = [[float(p.values(p.initial(), slack)[0]) for p in posteriors] for slack in (0.1, 0.01)]
+    np.testing.assert_allclose(beginnings(posteriors, (0.1, 0.01)), alone, rtol=1e-12)
+    assert len(np.unique(alone)) == 6

@@ -22,6 +22,7 @@ from ._nuisances import prepare_all as prepare_all
 from ._posterior import LANES as LANES
 from ._posterior import Hypothesis as Hypothesis
 from ._posterior import Posterior as Posterior
+from ._posterior import beginnings as beginnings
 from ._posterior import lanes_of as lanes_of
 from ._posterior import prior as prior
 from ._starts import Placed as Placed

@@ -132,6 +132,13 @@ def value_and_slopes(
     return Slopes(value, root, base.error * standard, slopes[0], slopes[1], slopes[2] if mixed else None)
 
 
+def loss(found: Innovations, use: Shaped[np.ndarray, "n channels"]) -> Float[np.ndarray, " lanes"]:
+    """Minus log-likelihoods of lanes (lanes, n, channels), of the readings that `use` (n, channels) counts."""
+    error, variance, log_share = map(np.asarray, found)
+    with np.errstate(all="ignore"):
+        return np.sum(use * (minus_log_density(error, variance) - log_share), (1, 2))
+
+
 def minus_log_density(error: np.ndarray, variance: np.ndarray) -> np.ndarray:
     """Minus the logarithm of the normal density of errors about zero."""
     return 0.5 * (error**2 / variance + np.log(2 * np.pi * variance))

@@ -15,7 +15,7 @@ from ..plant import Grid, Imposed, Plant, hidden_width, numbers_of
 from ..structures import AbstractFriction, ChannelDelay, ForceDelay, Structure
 from ._colour import Colour
 from ._layout import plant_rows, plant_vector
-from ._likelihood import Runs, Scene, Slopes, innovations_of, value_and_slopes
+from ._likelihood import Runs, Scene, Slopes, innovations_of, loss, value_and_slopes
 from ._linear_lanes import is_linear, linear_innovations
 from ._nuisances import Nuisances
 from ._tangents import NUDGE, has_tangents, slopes_along
@@ -132,9 +132,7 @@ class Posterior:
 
     def _value(self, theta: Float[np.ndarray, " unknowns"], lane: int, slack: float, first: bool) -> float:
         total = prior(self.hypothesis.unknowns[lane], theta)[0]
-        for seen, use in self._seen(theta, lane, slack, first):
-            total += value_and_slopes(lambda _, seen=seen: seen, np.zeros(0), use).value
-        return total
+        return total + sum(float(loss(seen, use)[0]) for seen, use in self._seen(theta, lane, slack, first))
 
     def misfit(
         self, theta: Float[np.ndarray, " unknowns"], lane: int = 0, slack: float = 0.0, first: bool = False
@@ -325,6 +323,22 @@ class Posterior:
         grid = Grid(float(nuisances.record.dt), nuisances.inputs.substeps)
         slots = {"smooth_slots": _slot_bucket(structure), "grid": grid, "rolled": True}
         return _Part.of(structure, [unknowns[k] for k in mine], nuisances, mine, slots)
+
+
+def beginnings(posteriors: Sequence[Posterior], slacks: Sequence[float]) -> Float[np.ndarray, "slacks posteriors"]:
+    """Minus log-posteriors with which starts of one law at one place begin, each alone in its posterior, where such
+    shares of the force are forgiven; infinite where a filter runs away."""
+    alike, begin = posteriors[0], [posterior.initial()[0] for posterior in posteriors]
+    known = [prior(p.hypothesis.unknowns[0], theta)[0] for p, theta in zip(posteriors, begin, strict=True)]
+    total = np.tile(known, (len(slacks), 1))
+    for index, nuisances in enumerate(alike.records):
+        until, parts = alike.until[index], [posterior._parts[index][0] for posterior in posteriors]
+        numbers = [part.numbers(theta[None, part.mine]) for part, theta in zip(parts, begin, strict=True)]
+        forgiven = [slackened(nuisances, max(slack, nuisances.forgiven)) for slack in slacks]
+        runs = Runs(np.concatenate(numbers * len(slacks)), np.repeat(forgiven, len(parts), 0))
+        seen = innovations_of(parts[0].scene(nuisances, until), runs, until)
+        total += loss(seen, np.asarray(nuisances.readings.use)[:until]).reshape(total.shape)
+    return np.nan_to_num(total, nan=math.inf, posinf=math.inf)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from ...structures import AbstractTerm, Structure
-from .effect import Effect
+from .effect import Effect, places
 from .initial_values import Begin
 
 _FOLLOWED = 8
@@ -52,11 +52,12 @@ def _least_share(tried: Sequence[Candidate]) -> float:
 
 def _near_the_best(tried: Sequence[Candidate]) -> set[tuple[Effect, ...]]:
     """Laws at the place of the one that explains most, and about as much, of a force that is not seen well."""
-    best = max((c for c in tried if c.share is not None), key=lambda c: c.share or 0.0, default=None)
-    if best is None or not best.share or best.share >= _UNSEEN:
+    told = {c: c.share for c in tried if c.share}
+    best = max(told, key=lambda c: told[c], default=None)
+    if best is None or told[best] >= _UNSEEN:
         return set()
-    there = [c for c in tried if [e.at for e in c.effects] == [e.at for e in best.effects]]
-    return {c.effects for c in there if (c.share or 0.0) >= _NEARLY * best.share}
+    least = _NEARLY * told[best]
+    return {c.effects for c, share in told.items() if share >= least and places(c.effects) == places(best.effects)}
 
 
 def contained(laws: Sequence[AbstractTerm], among: Sequence[Candidate]) -> list[Candidate]:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...identification import LADDER, LANES, Maximum, Posterior, finish, lanes_of, rungs, with_offsets
+from ...identification import LADDER, LANES, Maximum, Posterior, beginnings, finish, lanes_of, rungs, with_offsets
 from ...structures import AccelerationGain, ForceGain, Structure
 from ..evidence.fitted import Trial, lane_left, trial
 from ..evidence.setup import Problem
@@ -70,17 +70,12 @@ class Batch:
         # Where one climbs alone it is the one that begins best, seen from where not too much is forgiven. How much that
         # is no one knows: the best from two places climb, where these are not the same.
         chosen = [0]
-        if len(posteriors) > 1:
-            begun = [[self._begins(p, share) for p in posteriors] for share in ladder[-2:]]
-            chosen = sorted({int(np.argmin(values)) for values in begun})
+        if len(posteriors) > 1 and not self.limit.over:
+            chosen = sorted({int(np.argmin(values)) for values in beginnings(posteriors, ladder[-2:])})
         for stands in zip(*(rungs(posteriors[i], ladder, limit=self.limit) for i in chosen), strict=True):
             found, best = min(zip(stands, chosen, strict=True), key=lambda one: np.min(one[0].value))
             self.posterior, self.candidates = posteriors[best], candidates[best * lanes :][:lanes]
             yield found
-
-    def _begins(self, posterior: Posterior, share: float) -> float:
-        """How it begins where such a share is forgiven; past the time limit no one looks."""
-        return math.inf if self.limit.over else float(np.min(posterior.values(posterior.initial(), share)))
 
     def step(self) -> "Batch":
         """On to the next stage, unless the time is over."""
