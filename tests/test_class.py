@@ -53,7 +53,20 @@ LAWS = {
     ],
     ("dry friction", "a spring that yields", "nonlinear damping", "a force with memory"): [
         ("jenkins", {"k": 1.0, "slip": 0.5}),
+        ("free_play", {"k": 1e4, "gap": 1e-3, "F_plus": 1.0, "F_minus": 1.1}),
         ("bouc_wen", {"k": 1.0, "beta": 1.0, "gamma": 0.5, "n": 1.0}),
+    ],
+    (
+        "a spring with play or a stop",
+        "dry friction",
+        "a spring that yields",
+        "nonlinear damping",
+        "a force with memory",
+    ): [
+        ("free_play", {"k": 10.0, "gap": 0.5, "F_plus": 2.0, "F_minus": 2.5}),
+    ],
+    ("a spring with play or a stop", "a force with memory"): [
+        ("free_play", {"k": 1.0, "gap": 0.5, "F_plus": 2.0, "F_minus": 2.5}),
     ],
     ("a spring that yields", "a force with memory"): [("bouc_wen", {"k": 1.0, "beta": 1.0, "gamma": -1.5, "n": 1.0})],
     ("a force with memory",): [("maxwell", {"k": 1.0, "tau": 0.2})],

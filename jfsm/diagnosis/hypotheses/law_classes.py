@@ -10,7 +10,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from ...plant import force_at
-from ...structures import AbstractSensor, AbstractTerm, BoucWen, Cause, LinearDamping, LinearStiffness
+from ...structures import AbstractSensor, AbstractTerm, BoucWen, Cause, FreePlay, LinearDamping, LinearStiffness
+from ..thresholds import THRESHOLDS
 from .curves import bent, growth
 
 _POINTS = 41
@@ -76,7 +77,18 @@ def classes_of(cause: Cause, part: AbstractTerm | AbstractSensor, peak: float, s
         found.update(_by_curve(part, peak, speed))
     if isinstance(part, BoucWen) and part.beta + part.gamma > 0:  # its force ends at a largest value, as friction does
         found.update((FRICTION, DAMPING))
+    if isinstance(part, FreePlay):
+        found -= _unseen_of_play(part, peak)
     return in_order(found)
+
+
+def _unseen_of_play(part: FreePlay, peak: float) -> set[str]:
+    """The classes of a slider behind a gap that a motion does not show: play where the gap is next to nothing of it,
+    friction where the slider stays."""
+    unseen = {PLAY} if part.gap < THRESHOLDS.negligible * peak else set[str]()
+    if part.k * (peak - part.gap) <= min(part.F_plus, part.F_minus):
+        unseen |= {FRICTION, HYSTERESIS, DAMPING}
+    return unseen
 
 
 def in_order(classes: Iterable[str]) -> tuple[str, ...]:
