@@ -43,7 +43,7 @@ In JSON, `decision` holds
 | `verdict` | as in the table below |
 | `winner` | key of the hypothesis that it rests on; of an undecided one `refitted` or `given`: nothing is named |
 | `near` | keys of laws whose class is right though their shape is not, or beside which a map does better |
-| `checks` | every comparison; those before place `since` were made, and judged anew |
+| `checks` | every comparison; those before number `since` belong to an earlier judgement, which no longer counts |
 | `stopped_by` | where it is undecided, the check that stopped it, with what was measured and the limit |
 | `factors` | by key; their product is the probability of an alternative |
 | `explained` | by key; the share of the refitted model's excess that a candidate explains (`kappa` in `candidates`) |
@@ -51,8 +51,8 @@ In JSON, `decision` holds
 | `model_error` | share of the elastic force that was admitted as model error to all |
 | `finished` | whether the search was |
 
-With the limit of `stopped_by` moved that check would pass, and no more is said: checks that come after it were not
-made, and may fail.
+If you move the limit of `stopped_by`, that check passes. Later checks were not made, and may still stop the verdict:
+`--with` tells. `candidates` are in the order of their log-evidence, not of their probability.
 
 `evidence` holds the scorecards. To judge them again with another threshold, `jfsm why run.json --with half=0.6`, or
 
@@ -83,12 +83,13 @@ alone.
 - *Prediction*: over some periods, restarted from the filtered motion again and again. *Held-out run*: over all held-out
   readings, never restarted. Along an imposed motion both are predictions of the force.
 - *Set of samples*: those that were fitted, and those of the same records that were kept back.
-- *Excess*: power of the error of prediction beyond what noise leaves in the mean.
+- *Excess*: mean square error of prediction, less the mean square error that noise alone would cause.
 - *Map*: a smooth function of displacement and velocity for the force that is missing, without a law.
-- *Looks*: independent glances at the error of prediction that a record stands for; so many times its logarithm counts
-  where more than noise is left.
+- *Looks*: how many independent errors of prediction a record stands for. Where more than noise is left, a hypothesis
+  is so many times the logarithm of its error less likely.
 - *Hypothesis*: the model as given, refitted, or with effects; its *key* is `given`, `refitted`, `coulomb@0-1`.
-  *Candidates* have effects; those that nothing speaks against are *alternatives*, with both models.
+  *Candidates* have effects; those that nothing speaks against are *alternatives*. The model as
+  given and the refitted model always are.
 
 ## Table of verdicts
 """
@@ -142,7 +143,15 @@ VERDICTS = (
     ),
     ("yes", "no", "no, or wrong shape", "", "yes, with the map", "yes", "unnamed"),
     ("yes", "no", "admissible", "not asked", "yes, with the map", "of what the cause leaves", "unnamed"),
-    ("yes", "no", "any", "", "no, with the map", "yes", "undecided: a map that fails there is not handed out"),
+    (
+        "yes",
+        "no",
+        "any",
+        "",
+        "no, with the map",
+        "yes",
+        "undecided: that map is not offered; `stopped_by` names it, `near` the law",
+    ),
     ("otherwise", "", "", "", "", "", "undecided, with the check that stopped it"),
 )
 CONDITIONS = (

@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jfsm
+from jfsm._format import FORMAT
 from jfsm.diagnosis import _diagnose
 from jfsm.diagnosis.evidence import measured
 from jfsm.diagnosis.evidence.free_runs import Gain
@@ -470,3 +471,7 @@ def test_friction_that_is_gone_at_speed_is_another_law(cause):
     for share, gone in ((0.1, True), (0.4, False)):
         law = jfsm.causes()[cause].term(at=(0, 1), **(numbers | {"F": share}))
         assert ("all but gone" in law.otherwise(9.0)) == gone
+
+
+def test_what_is_written_says_in_which_format(hidden_cubic):
+    assert hidden_cubic.data["format"] == FORMAT

@@ -326,7 +326,8 @@ def test_text_of_a_cause_says_where_how_sure_how_large_and_what_else_it_may_be()
 
 def test_what_predicts_worse_than_without_explains_nothing():
     """A law that sticks may run far off; by how much is no share of anything."""
-    [row] = candidates_table([candidate("jenkins", 54000.0, -2.4e9, 0.0, "explains 0% of what a refit leaves")]).rows
+    why = "explains 0% of what the refitted model leaves"
+    [row] = candidates_table([candidate("jenkins", 54000.0, -2.4e9, 0.0, why)]).rows
     assert "0 %" in row and not any("−" in cell for cell in row)
 
 

@@ -9,6 +9,7 @@ import pytest
 from test_verdict import RIGHT, card, evidence_of, judged
 from typer.testing import CliRunner
 
+from jfsm._format import FORMAT
 from jfsm.cli import app
 from jfsm.diagnosis.thresholds import THRESHOLDS
 from jfsm.diagnosis.verdict.checks import CHECKS
@@ -48,6 +49,7 @@ def row(name: str, of: str, passed: bool, says: str, stage: str = "admissible") 
 STOPPED = row("explains_half_of_excess", "coulomb@0-1", False, "explains 31% of what the model leaves")
 MAPPED = "refitted with a map"
 UNDECIDED = {
+    "format": FORMAT,
     "verdict": "undecided",
     "sentence": "Something is wrong.",
     "decision": {
@@ -133,8 +135,8 @@ def test_a_check_that_chooses_the_path_is_no_failure_unless_it_stopped_the_verdi
         ({"factors": {"coulomb@0-1": [{"name": "share", "size": 0.6}, {"name": "refused", "size": 0.0}]}},
          "Most probable law: Coulomb friction at link ground–1 (60 % before it was refused). Not named: explains 31 %"),
         ({"factors": {}, "explained": {"stribeck@0-1": 0.3, "coulomb@0-1": 0.2, MAPPED: 0.9}},
-         "The law that explains most: Stribeck friction at link ground–1 (30 % of what a refit leaves). Not named: not "
-         "fitted: other laws explain more."),
+         "The law that explains most: Stribeck friction at link ground–1 (30 % of what the refitted model "
+         "leaves). Not named: not fitted: other laws explain more."),
         ({"factors": {}, "explained": {"coulomb@0-1": -0.2}}, ""),
     ],
 )  # fmt: skip
@@ -167,7 +169,9 @@ def test_a_decision_can_be_read_and_a_written_one_judged_again(tmp_path):
     assert "Probability of Coulomb friction at link ground–1: 99." in decision.why()
     assert "explains half" in decision.why("coulomb") or "at least 50 %" in decision.why("coulomb")
     path = tmp_path / "run.json"
-    path.write_text(json.dumps({"verdict": "cause", "decision": decision.plain, "evidence": evidence.plain}))
+    path.write_text(
+        json.dumps({"format": FORMAT, "verdict": "cause", "decision": decision.plain, "evidence": evidence.plain})
+    )
 
     def again(*changed: str) -> tuple[int, str]:
         shown = CliRunner().invoke(app, ["why", str(path), *(part for each in changed for part in ("--with", each))])
@@ -188,7 +192,7 @@ def test_a_decision_can_be_read_and_a_written_one_judged_again(tmp_path):
 
 def test_what_has_no_evidence_cannot_be_judged_again(numbers):
     shown = CliRunner().invoke(app, ["why", str(numbers), "--with", "half=0.4"])
-    assert shown.exit_code == 2 and "with 'evidence' that can be judged" in " ".join(shown.output.split())
+    assert shown.exit_code == 2 and "no 'evidence' that can be judged" in " ".join(shown.output.split())
 
 
 def test_the_judgement_that_stands_begins_where_that_before_it_ends():
@@ -208,3 +212,12 @@ def test_why_of_a_file_without_checks_is_refused(tmp_path):
     path.write_text('{"verdict": "cause"}', encoding="utf-8")
     shown = CliRunner().invoke(app, ["why", str(path)])
     assert shown.exit_code == 2 and "jfsm diagnose --json" in " ".join(shown.output.split())
+
+
+@pytest.mark.parametrize("written", [{}, {"format": FORMAT + 1}], ids=["none", "newer"])
+def test_what_another_version_wrote_is_refused_with_what_to_do(tmp_path, written: dict):
+    path = tmp_path / "run.json"
+    path.write_text(json.dumps({**UNDECIDED, "format": None, **written, "jfsm": "0.3"}), encoding="utf-8")
+    shown = CliRunner().invoke(app, ["why", str(path)])
+    words = " ".join(shown.output.split())
+    assert shown.exit_code == 2 and "another one wrote it" in words and "diagnose the record again" in words

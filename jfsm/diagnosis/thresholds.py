@@ -1,4 +1,4 @@
-"""Every number that decides a verdict, each with its unit, what it means, and where it comes from.
+"""Every number that the judge uses, each with its unit, what it means, and where it comes from.
 
 They are an argument of the judge (`verdict.judge`), so that recorded evidence can be judged anew with others.
 """

@@ -206,8 +206,8 @@ def _how_near(decision: Dictionary, key: str) -> str:
     factors = (decision.get("factors") or {}).get(key) or ()
     kind = "cause" if ":" in key else "law"
     if not factors:
-        share = float((decision.get("explained") or {}).get(key, 0.0))
-        return f"The {kind} that explains most: {hypothesis_name(key)} ({percent(share)} of what a refit leaves)"
+        share = percent(float((decision.get("explained") or {}).get(key, 0.0)))
+        return f"The {kind} that explains most: {hypothesis_name(key)} ({share} of what the refitted model leaves)"
     now, before = chance(factors), _unrefused(factors)
     sure = percent(now) if now else f"{percent(before)} before it was refused"
     rivals = [_unrefused(each) for other, each in decision["factors"].items() if "@" in other]

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+from jfsm._format import FORMAT
 from jfsm.reporting._inspection_page import render_inspection
 from jfsm.reporting._page import render_page
 
@@ -32,7 +33,7 @@ def read_diagnosis(path: str | Path) -> dict[str, Any]:
     OSError
         If the file cannot be read.
     ValueError
-        If it does not hold the numbers of a diagnosis with its checks, or is cut short.
+        If it does not hold the numbers of a diagnosis with its checks, is cut short, or another version wrote it.
     """
 
     def checked(d: dict[str, Any]) -> dict[str, Any]:
@@ -40,7 +41,14 @@ def read_diagnosis(path: str | Path) -> dict[str, Any]:
             raise ValueError("it has no checks")
         return d
 
-    return _shown(path, checked)
+    d = _shown(path, checked)
+    if d.get("format") != FORMAT:
+        raise ValueError(
+            f"{path} must be what this version of jfsm writes (format {FORMAT}); another one wrote it (format "
+            f"{d.get('format')}, jfsm {d.get('jfsm')}). Its verdict can be read, not explained or judged again: "
+            "diagnose the record again with --json."
+        )
+    return d
 
 
 def _shown(path: str | Path, show: Callable[[dict[str, Any]], T]) -> T:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
+from ..._format import FORMAT
 from ...plant import Reconstruction
 from ...structures import AbstractTerm, Clipping, Structure
 from .._diagnosis import CandidateResult, Diagnosis
@@ -105,6 +106,7 @@ def assemble(
     findings = with_signs(findings, verdict, looked)
     data = {
         "jfsm": jfsm_version(),
+        "format": FORMAT,
         "verdict": decision.verdict,
         "finished": not unfinished.notes,
         "untried": list(unfinished.untried),

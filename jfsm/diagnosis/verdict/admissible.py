@@ -116,7 +116,7 @@ def _explains_half(card: Scorecard, bench: Bench) -> Reason:
     unseen = not bench.shows(bench.refitted) and gain > bench.limits.searched and noise_only
     if share < half and unseen and (is_constant(card) or not bench.noise_only(bench.refitted)):
         return ""  # predictions leave nothing to explain, and the innovations tell
-    reason = f"explains {max(over_refit, 0.0):.0%} of what a refit leaves, less than half"
+    reason = f"explains {max(over_refit, 0.0):.0%} of what the refitted model leaves, less than half"
     says = f"explains {share:.0%} of what the model leaves; at least {half:.0%} is needed"
     done = bench.check("explains_half_of_excess", card.key, share, half, says)
     return "" if done.passed else reason
@@ -162,7 +162,7 @@ def _is_enough(alone: Scorecard, pair: Scorecard, bench: Bench) -> Reason:
     probable = bench.check("second_effect_pays", pair.key, nats, least, says).passed
     if probable and (unseen or _predicts_better(alone, pair, bench)):
         return ""
-    return "is about as probable" if unseen else "explains it about as well"
+    return "is about as probable" if unseen or not probable else "explains it about as well"
 
 
 def _separation(pair: Scorecard, alone: Scorecard, bench: Bench) -> tuple[bool, bool]:

@@ -28,6 +28,6 @@ def judge_again(numbers: Mapping[str, Any], limits: Thresholds) -> Decision:
         ) from None
     except (KeyError, TypeError) as error:
         raise ValueError(
-            "`numbers` must be what `Diagnosis.to_json` of this version writes, with 'evidence' that can be judged "
-            f"({type(error).__name__}: {error}). Diagnose again with --json."
+            "`numbers` must be what `Diagnosis.to_json` of this version writes; these have no 'evidence' that can be "
+            f"judged, as those of another version ({type(error).__name__}: {error}). Diagnose again with --json."
         ) from None

@@ -153,8 +153,8 @@ class _Judgement:
             return True
         share = bench.explained(winner)
         says = (
-            f"explains {share:.0%} of what a refit leaves, and leaves more than {limits.much:.0%} of the signal; "
-            f"at least {limits.nearly_all:.0%} is needed"
+            f"explains {share:.0%} of what the refitted model leaves, and leaves more than {limits.much:.0%} of the "
+            f"signal; at least {limits.nearly_all:.0%} is needed"
         )
         row = bench.check("explains_nearly_all", winner.key, share, limits.nearly_all, says)
         if not row.passed:
