@@ -84,7 +84,8 @@ class Posterior:
     @property
     def has_tangents(self) -> bool:
         """Whether slopes along one run pay."""
-        scenes = (parts[0].scene(n, n.samples) for parts, n in zip(self._parts, self.records, strict=True))
+        each = zip(self._parts, self.records, self.until, strict=True)
+        scenes = (parts[0].scene(nuisances, until) for parts, nuisances, until in each)
         return any(has_tangents(scene) and not is_linear(scene) for scene in scenes)
 
     def initial(self) -> Float[np.ndarray, "lanes unknowns"]:
