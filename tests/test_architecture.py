@@ -15,6 +15,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "jfsm"
 ROOMS = (
     "_types",
     "_result",
+    "_format",
     "_limit",
     "_threads",
     "_programs",
