@@ -82,7 +82,7 @@ def test_what_moves_no_gain_and_the_noise_of_channels_have_the_slopes_of_whole_r
     noisy = [k for k, name in enumerate(names) if name.startswith("noise@")]
     assert len(moved) >= 3 and len(noisy) == 4
     for k in moved:
-        np.testing.assert_allclose(along.by_error[k], exact.by_error[k], atol=0.02 * np.std(exact.by_error[k]))
+        np.testing.assert_allclose(along.by_error[k], exact.by_error[k], atol=0.02 * float(np.std(exact.by_error[k])))
     for k in noisy:
         scale = np.std(exact.by_spread[k])
         assert np.std(along.by_spread[k] - exact.by_spread[k]) < 0.05 * scale
