@@ -522,7 +522,7 @@ def _overrun(plant, before: Motion, after: Motion, covariance, slope, dt):
 def _update(
     plant, minv, observation, motion: Motion, zeros, of_zeros, covariance, overrun, load: Load, before, y, use,
     variances, nothing,
-) -> tuple[Float[Array, " state"], Float[Array, "state state"], "_Told"]:  # fmt: skip
+) -> tuple[Float[Array, " state"], Float[Array, "state state"], _Told]:  # fmt: skip
     """State after the readings of one sample, and what they told; `overrun` tells how surely links rest, `load` is
     that of the sample's first step, `before` what drove it earlier, and speeds of links up to `nothing` are none."""
     at_first = jnp.concatenate([motion.x, motion.v, motion.z])

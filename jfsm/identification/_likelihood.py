@@ -35,7 +35,7 @@ _BLOCKS = 64
 """Stretches of a record whose gradients count as independent of each other."""
 _PIECE = 256
 """Columns of a product that one core is faster with."""
-_NUDGE = 1e-6
+NUDGE = 1e-6
 """Change of an unknown that shows what it does."""
 _HANDFUL, _MOSTLY = 8, 0.5
 """Where so few readings like the greatest hold such a share of what an unknown does, a lane may have jumped: it is
@@ -108,7 +108,7 @@ def value_and_slopes(
     def in_a_row(values: np.ndarray) -> Any:
         return Innovations(*(a.reshape(len(values), -1) for a in run(values)))
 
-    nudges = _NUDGE * np.eye(theta.size)
+    nudges = NUDGE * np.eye(theta.size)
     found, use = in_a_row(np.concatenate([theta[None], theta + nudges])), use.ravel()
     base: Any = Innovations(*(a[0] for a in found))
     with np.errstate(all="ignore"):
@@ -122,11 +122,11 @@ def value_and_slopes(
             by_spread = np.log(lanes.variance / base.variance) * (root / nudge)
             return [by_error, by_spread, *([(lanes.log_share - base.log_share) * (use / nudge)] if mixed else [])]
 
-        slopes = changes(Innovations(found.error[1:], found.variance[1:], found.log_share[1:]), _NUDGE)
+        slopes = changes(Innovations(found.error[1:], found.variance[1:], found.log_share[1:]), NUDGE)
         power = slopes[0] ** 2 + 0.5 * slopes[1] ** 2
         jumped = _HANDFUL * np.max(power, 1, initial=0.0) > _MOSTLY * np.sum(power, 1)
         if np.any(jumped):
-            back = changes(in_a_row(theta - nudges[jumped]), -_NUDGE)
+            back = changes(in_a_row(theta - nudges[jumped]), -NUDGE)
             for mine, other in zip(slopes, back, strict=True):
                 mine[jumped] = np.where(np.abs(other) < np.abs(mine[jumped]), other, mine[jumped])
     return Slopes(value, root, base.error * standard, slopes[0], slopes[1], slopes[2] if mixed else None)
@@ -294,11 +294,11 @@ def _run(
 
     `leaves` and `static` are a plant, `Noise` and an `Observation`.
     """
-    plants, assumed, observation, state = lanes_of(static, leaves, numbers, velocity, dt, stretch, state, first)
+    plants, assumed, observation, state = lanes_before(static, leaves, numbers, velocity, dt, stretch, state, first)
     return run(plants, assumed, observation, stretch, dt, state, one_kernel=one_kernel)
 
 
-def lanes_of(
+def lanes_before(
     static: Any,
     leaves: list[Array],
     numbers: Float[Array, "lanes size"],

@@ -15,10 +15,10 @@ from ..plant import Grid, Imposed, Plant, hidden_width, numbers_of
 from ..structures import AbstractFriction, ChannelDelay, ForceDelay, Structure
 from ._colour import Colour
 from ._layout import plant_rows, plant_vector
-from ._likelihood import Runs, Scene, Slopes, innovations_of, loss, value_and_slopes
+from ._likelihood import NUDGE, Runs, Scene, Slopes, innovations_of, loss, value_and_slopes
 from ._linear_lanes import is_linear, linear_innovations
 from ._nuisances import Nuisances
-from ._tangents import NUDGE, has_tangents, slopes_along
+from ._tangents import has_tangents, slopes_along
 from ._unknowns import Unknown, values_of
 
 LANES = 2

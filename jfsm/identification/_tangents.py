@@ -28,12 +28,10 @@ from .._types import Array
 from ..estimation._filter import Passage, State, Stretch, few_states, passages, shown
 from ..plant import InterpolatedInput, acceleration, advance_sample, begin, inverse_mass, true_force
 from ._layout import with_vector
-from ._likelihood import SAMPLES, Scene, Slopes, lanes_of, minus_log_density, tail_of
+from ._likelihood import NUDGE, SAMPLES, Scene, Slopes, lanes_before, minus_log_density, tail_of
 
 _WIDTH = 16
 """Unknowns that a program changes at a time; fewer are padded, so that one program serves all."""
-NUDGE = 1e-6
-"""Change of an unknown that shows what it does."""
 _COARSER = 4
 """Steps that are one here: a difference of steps needs no short ones."""
 
@@ -117,7 +115,7 @@ def _no_change(passed: Passage) -> _Change:
 @partial(jax.jit, static_argnums=0)
 def _passages(static: Any, leaves, numbers, velocity, dt, stretch: Stretch, state: State, first: Bool[Array, ""]):
     """State of a lane after a stretch, and its `Passage` (n, 1, ...); arguments as of a run."""
-    plants, assumed, observation, state = lanes_of(static, leaves, numbers, velocity, dt, stretch, state, first)
+    plants, assumed, observation, state = lanes_before(static, leaves, numbers, velocity, dt, stretch, state, first)
     return passages(plants, assumed, observation, stretch, dt, state)
 
 

@@ -52,12 +52,12 @@ def _least_share(tried: Sequence[Candidate]) -> float:
 
 def _near_the_best(tried: Sequence[Candidate]) -> set[tuple[Effect, ...]]:
     """Laws at the place of the one that explains most, and about as much, of a force that is not seen well."""
-    told = {c: c.share for c in tried if c.share}
-    best = max(told, key=lambda c: told[c], default=None)
-    if best is None or told[best] >= _UNSEEN:
+    shares = {c: c.share for c in tried if c.share}
+    best = max(shares, key=lambda c: shares[c], default=None)
+    if best is None or shares[best] >= _UNSEEN:
         return set()
-    least = _NEARLY * told[best]
-    return {c.effects for c, share in told.items() if share >= least and places(c.effects) == places(best.effects)}
+    least = _NEARLY * shares[best]
+    return {c.effects for c, share in shares.items() if share >= least and places(c.effects) == places(best.effects)}
 
 
 def contained(laws: Sequence[AbstractTerm], among: Sequence[Candidate]) -> list[Candidate]:
