@@ -144,7 +144,7 @@ def _by_unknowns(static: Any, leaves, run, lot, dt, stretch: Stretch, passed: Pa
     (n, channels, width), by each of a lot of unknowns."""
     plant, _, observation = jax.tree.unflatten(static, leaves)
     passed = jax.tree.map(lambda a: a[:, 0], passed)
-    stride = 1 if plant.hidden else min(_COARSER, (stretch.base.shape[1] - 1) // 2)
+    stride = min(_COARSER, (stretch.base.shape[1] - 1) // 2)
     force, base = stretch.force[:, ::stride, 0], stretch.base[:, ::stride]
 
     def one(row, predicted, read, force, base, time):
