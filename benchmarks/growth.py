@@ -84,20 +84,20 @@ def timed(make: Callable[[], Case]) -> tuple[float, float, int, float]:
     from jfsm.identification import _posterior
 
     case, spent, count = make(), [], [0]
-    slopes = _posterior.value_and_slopes
+    slopes = _posterior.values_and_slopes
 
     def counted(*arguments):
         count[0] += 1
         return slopes(*arguments)
 
-    _posterior.value_and_slopes = counted
+    _posterior.values_and_slopes = counted
     try:
         for _ in range(2):
             count[0], begin = 0, time.process_time()
             found = jfsm.fit(case.model, case.record)  # pyright: ignore[reportArgumentType]
             spent.append(time.process_time() - begin)
     finally:
-        _posterior.value_and_slopes = slopes
+        _posterior.values_and_slopes = slopes
     springs = [value for path, value in found.values.items() if path.startswith("stiffness")]  # pyright: ignore[reportPossiblyUnbound]
     return spent[0], spent[1], count[0], max(abs(value / case.stiffness - 1) for value in springs)
 

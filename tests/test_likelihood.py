@@ -158,8 +158,10 @@ def test_a_value_of_zero_cannot_be_refitted_as_a_share_of_itself():
         own_unknown(jfsm.Structure.sdof(1.0, 9.0), "damping@0-1.c", {})
 
 
-def test_two_lanes_are_what_each_of_them_is_alone(chain_nuisances, smooth):
-    other = hypothesis(MODEL, jfsm.CubicStiffness(-0.7, at=(0, 1)), chain_nuisances)
+@pytest.mark.parametrize("at", [(0, 1), (1, 2)])
+def test_two_lanes_are_what_each_of_them_is_alone(chain_nuisances, smooth, at):
+    """Wherever the law of the second is: at one place they share runs."""
+    other = hypothesis(MODEL, jfsm.CubicStiffness(-0.7, at=at), chain_nuisances)
     both = Posterior(together(smooth.hypothesis, other), [chain_nuisances])
     theta = somewhere(both)
     found = both.evaluate(theta)

@@ -75,8 +75,8 @@ def test_a_step_gains_nearly_what_one_by_whole_runs_does(posterior: Posterior, t
 
 def test_what_moves_no_gain_and_the_noise_of_channels_have_the_slopes_of_whole_runs(posterior: Posterior, top):
     """Offsets move the readings alone; along a motion that is nearly linear noise changes the gains alone."""
-    exact = posterior._slopes(top[0], 0, 0)
-    along = posterior._slopes(top[0], 0, 0, exact=False)
+    [(_, exact)] = posterior._slopes(top, 0, np.arange(1))
+    [(_, along)] = posterior._slopes(top, 0, np.arange(1), exact=False)
     names = [u.path for u in posterior.hypothesis.unknowns[0]]
     moved = [k for k, name in enumerate(names) if name.startswith(("offset@acceleration", "offset@displacement"))]
     noisy = [k for k, name in enumerate(names) if name.startswith("noise@")]

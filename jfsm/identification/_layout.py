@@ -4,7 +4,7 @@ A plant is linear in every mass, stiffness, law parameter and sensor value, so a
 matrix is the plant. That matrix is data: another place, sign or law leaves the compiled program as it is.
 """
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -51,6 +51,17 @@ def with_vector(plant: Plant, vector: Float[Array, " size"]) -> Plant:
         row = jnp.reshape(vector[place : place + size], old.parameters.shape)
         parts[name], place = type(old)(old.kind, row, old.direction, old.laws), place + size
     return replace(plant, **parts)
+
+
+def besides_numbers(plant: Plant) -> Hashable:
+    """What a plant holds besides numbers that parameters can change: places, directions and kinds of laws."""
+    parts = {name: getattr(plant, name) for name in _PARTS + _SLOTS}
+    bare: dict[str, Any] = {name: np.zeros(parts[name].shape) for name in _PARTS}
+    for name in _SLOTS:
+        old = parts[name]
+        bare[name] = type(old)(old.kind, np.zeros(old.parameters.shape), old.direction, old.laws)
+    leaves, tree = jax.tree.flatten(replace(plant, **bare))
+    return tree, tuple(np.asarray(leaf).tobytes() for leaf in leaves)
 
 
 def place_of(plant: Plant, name: str) -> slice:

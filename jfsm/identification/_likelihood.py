@@ -95,41 +95,64 @@ def _gram(rows: np.ndarray) -> np.ndarray:
     return np.sum([piece @ piece.T.copy() for piece in pieces], 0)
 
 
-def value_and_slopes(
-    run: Callable[[np.ndarray], Innovations],
-    theta: Float[np.ndarray, " unknowns"],
+def values_and_slopes(
+    run: Callable[[np.ndarray, np.ndarray], Innovations],
+    thetas: Float[np.ndarray, "lanes unknowns"],
     use: Shaped[np.ndarray, "n channels"],
-) -> Slopes:
-    """`Slopes` at `theta` (unknowns,) of the readings that `use` (n, channels) counts.
+) -> list[Slopes]:
+    """`Slopes` of each lane at its values (lanes, unknowns), of the readings that `use` (n, channels) counts.
 
-    `run` gives the innovations (lanes, n, channels) of some values (lanes, unknowns).
+    `run` gives the innovations (runs, n, channels) of lanes (runs,), in ascending order, at values (runs, unknowns).
     """
+    count, size = thetas.shape
+    nudges, counts = NUDGE * np.eye(size), use.ravel()
 
-    def in_a_row(values: np.ndarray) -> Any:
-        return Innovations(*(a.reshape(len(values), -1) for a in run(values)))
+    def in_rows(lanes: np.ndarray, values: np.ndarray) -> Any:
+        return Innovations(*(a.reshape(len(values), -1) for a in run(lanes, values)))
 
-    nudges = NUDGE * np.eye(theta.size)
-    found, use = in_a_row(np.concatenate([theta[None], theta + nudges])), use.ravel()
-    base: Any = Innovations(*(a[0] for a in found))
-    with np.errstate(all="ignore"):
-        root = np.sqrt(use)
-        standard = root / np.sqrt(base.variance)
-        value = float(np.sum(use * (minus_log_density(base.error, base.variance) - base.log_share)))
-        mixed = bool(np.any(base.log_share))
+    around = thetas[:, None] + np.concatenate([np.zeros((1, size)), nudges])
+    found = in_rows(np.repeat(np.arange(count), size + 1), around.reshape(-1, size))
+    lanes = [_Differences(Innovations(*(a[k * (size + 1) :][: size + 1] for a in found)), counts) for k in range(count)]
+    back = [(lane, k) for lane, one in enumerate(lanes) for k in np.flatnonzero(one.jumped)]
+    if back:
+        of, which = np.array(back).T
+        other = in_rows(of, thetas[of] - nudges[which])
+        for lane, one in enumerate(lanes):
+            one.flattened(Innovations(*(a[of == lane] for a in other)))
+    return [one.slopes for one in lanes]
 
-        def changes(lanes: Any, nudge: float) -> list[np.ndarray]:
-            by_error = (lanes.error - base.error) * (standard / nudge)
-            by_spread = np.log(lanes.variance / base.variance) * (root / nudge)
-            return [by_error, by_spread, *([(lanes.log_share - base.log_share) * (use / nudge)] if mixed else [])]
 
-        slopes = changes(Innovations(found.error[1:], found.variance[1:], found.log_share[1:]), NUDGE)
-        power = slopes[0] ** 2 + 0.5 * slopes[1] ** 2
-        jumped = _HANDFUL * np.max(power, 1, initial=0.0) > _MOSTLY * np.sum(power, 1)
-        if np.any(jumped):
-            back = changes(in_a_row(theta - nudges[jumped]), -NUDGE)
-            for mine, other in zip(slopes, back, strict=True):
-                mine[jumped] = np.where(np.abs(other) < np.abs(mine[jumped]), other, mine[jumped])
-    return Slopes(value, root, base.error * standard, slopes[0], slopes[1], slopes[2] if mixed else None)
+class _Differences:
+    """Differences between the innovations (1 + unknowns, readings) of a run and of those with each unknown nudged."""
+
+    def __init__(self, found: Any, use: Float[np.ndarray, " readings"]):
+        self.base: Any = Innovations(*(a[0] for a in found))
+        self.use, self.root = use, np.sqrt(use)
+        with np.errstate(all="ignore"):
+            self.standard = self.root / np.sqrt(self.base.variance)
+            self.changes = self._changes(Innovations(*(a[1:] for a in found)), NUDGE)
+            power = self.changes[0] ** 2 + 0.5 * self.changes[1] ** 2
+            self.jumped = _HANDFUL * np.max(power, 1, initial=0.0) > _MOSTLY * np.sum(power, 1)
+
+    def _changes(self, lanes: Any, nudge: float) -> list[np.ndarray]:
+        by_error = (lanes.error - self.base.error) * (self.standard / nudge)
+        by_spread = np.log(lanes.variance / self.base.variance) * (self.root / nudge)
+        mixed = bool(np.any(self.base.log_share))
+        return [by_error, by_spread, *([(lanes.log_share - self.base.log_share) * (self.use / nudge)] if mixed else [])]
+
+    def flattened(self, back: Any) -> None:
+        """The smaller of both differences for unknowns that `jumped`, whose runs nudged `back` are these."""
+        with np.errstate(all="ignore"):
+            for mine, other in zip(self.changes, self._changes(back, -NUDGE), strict=True):
+                mine[self.jumped] = np.where(np.abs(other) < np.abs(mine[self.jumped]), other, mine[self.jumped])
+
+    @property
+    def slopes(self) -> Slopes:
+        with np.errstate(all="ignore"):
+            density = minus_log_density(self.base.error, self.base.variance) - self.base.log_share
+            value = float(np.sum(self.use * density))
+        by_error, by_spread, *by_share = self.changes
+        return Slopes(value, self.root, self.base.error * self.standard, by_error, by_spread, *(by_share or [None]))
 
 
 def loss(found: Innovations, use: Shaped[np.ndarray, "n channels"]) -> Float[np.ndarray, " lanes"]:

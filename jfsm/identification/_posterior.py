@@ -3,6 +3,7 @@
 import math
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import jax
@@ -14,8 +15,8 @@ from ..estimation._filter import Innovations
 from ..plant import Grid, Imposed, Plant, hidden_width, numbers_of
 from ..structures import AbstractFriction, ChannelDelay, ForceDelay, Structure
 from ._colour import Colour
-from ._layout import plant_rows, plant_vector
-from ._likelihood import NUDGE, Runs, Scene, Slopes, innovations_of, loss, value_and_slopes
+from ._layout import besides_numbers, plant_rows, plant_vector
+from ._likelihood import NUDGE, Runs, Scene, Slopes, innovations_of, loss, values_and_slopes
 from ._linear_lanes import is_linear, linear_innovations
 from ._nuisances import Nuisances
 from ._tangents import has_tangents, slopes_along
@@ -111,14 +112,14 @@ class Posterior:
         """
         count, size = theta.shape
         value, gradient, information = np.zeros(count), np.zeros((count, size)), np.zeros((count, size, size))
-        for lane in range(count):
-            if lanes is not None and not lanes[lane]:
-                value[lane] = np.inf
-                continue
+        asked = np.arange(count) if lanes is None else np.flatnonzero(lanes)
+        value[~np.isin(np.arange(count), asked)] = np.inf
+        for lane in asked:
             value[lane], gradient[lane], curvature = prior(self.hypothesis.unknowns[lane], theta[lane])
             information[lane] = np.diag(curvature)
-            for index, part in enumerate(self._parts):
-                found, mine = self._slopes(theta[lane], index, lane, slack, first, exact), part[lane].mine
+        for index, parts in enumerate(self._parts):
+            for lane, found in self._slopes(theta, index, asked, slack, first, exact):
+                mine = parts[lane].mine
                 value[lane] += found.value
                 gradient[lane, mine] += found.gradient
                 information[lane][np.ix_(mine, mine)] += found.information
@@ -174,28 +175,37 @@ class Posterior:
         """Covariance (lanes, unknowns, unknowns) of the gradient as the record itself shows it, from its stretches."""
         total = np.zeros((*theta.shape, theta.shape[1]))
         for index, parts in enumerate(self._parts):
-            for lane, part in enumerate(parts):
-                total[lane][np.ix_(part.mine, part.mine)] += self._slopes(theta[lane], index, lane).scatter
+            for lane, found in self._slopes(theta, index, np.arange(len(theta))):
+                total[lane][np.ix_(parts[lane].mine, parts[lane].mine)] += found.scatter
         return total
 
     def _slopes(
-        self, theta: np.ndarray, index: int, lane: int, slack: float = 0.0, first: bool = False, exact: bool = True
-    ) -> Slopes:
-        """What the readings of record `index` say of the unknowns that act on it."""
-        nuisances, until = self.records[index], self._until(index, first)
-        use, mine = np.asarray(nuisances.readings.use)[:until], self._parts[index][lane].mine
-        forgiven, scene = max(slack, nuisances.forgiven), self._parts[index][lane].scene(nuisances, until)
-        if not (exact or is_linear(scene)) and has_tangents(scene):
-            nudged = theta[mine] + NUDGE * np.eye(len(mine))
-            numbers = self._parts[index][lane].numbers(np.concatenate([theta[mine][None], nudged]))
-            return slopes_along(scene, numbers, slackened(nuisances, forgiven), use)
+        self,
+        theta: np.ndarray,
+        index: int,
+        lanes: np.ndarray,
+        slack: float = 0.0,
+        first: bool = False,
+        exact: bool = True,
+    ) -> Iterator[tuple[int, Slopes]]:
+        """Lane by lane, what the readings of record `index` say of the unknowns that act on it."""
+        nuisances, until, parts = self.records[index], self._until(index, first), self._parts[index]
+        use, forgiven = np.asarray(nuisances.readings.use)[:until], max(slack, nuisances.forgiven)
+        for alike in _alike(parts, lanes):
+            scene, mine = parts[alike[0]].scene(nuisances, until), parts[alike[0]].mine
+            if not (exact or is_linear(scene)) and has_tangents(scene):
+                for lane in alike:
+                    around = theta[lane, mine] + NUDGE * np.eye(len(mine) + 1, len(mine), -1)
+                    numbers = parts[lane].numbers(around)
+                    yield lane, slopes_along(scene, numbers, slackened(nuisances, forgiven), use)
+                continue
 
-        def run(values: np.ndarray) -> Innovations:
-            every = np.repeat(theta[None], len(values), 0)
-            every[:, mine] = values
-            return self._run(every, index, lane, np.full(len(values), forgiven), until)
+            def run(of: np.ndarray, values: np.ndarray, alike=alike, scene=scene) -> Innovations:
+                numbers = [parts[lane].numbers(values[of == k]) for k, lane in enumerate(alike)]
+                velocity = np.repeat(slackened(nuisances, forgiven)[None], len(values), 0)
+                return _filtered(scene, Runs(np.concatenate(numbers), velocity), until)
 
-        return value_and_slopes(run, theta[mine], use)
+            yield from zip(alike, values_and_slopes(run, theta[alike][:, mine], use), strict=True)
 
     def _run(
         self,
@@ -214,8 +224,7 @@ class Posterior:
         nuisances = self.records[index] if nuisances is None else nuisances
         shares, which = np.unique(slack, return_inverse=True)
         velocity = np.stack([slackened(nuisances, share) for share in shares])[which]
-        runs = Runs(part.numbers(theta[:, part.mine]), velocity, use, push)
-        return (linear_innovations if is_linear(scene) else innovations_of)(scene, runs, until)
+        return _filtered(scene, Runs(part.numbers(theta[:, part.mine]), velocity, use, push), until)
 
     def innovations(
         self,
@@ -295,9 +304,9 @@ class Posterior:
         nuisances, until = self.records[index], min(self.until[index], _COLOUR_SAMPLES)
         use = np.asarray(nuisances.readings.use)[:until]
 
-        def run(lanes: np.ndarray) -> Innovations:
+        def run(_: np.ndarray, values: np.ndarray) -> Innovations:
             found = list[Any]()
-            for one in lanes:
+            for one in values:
                 colour = Colour.of(one, channels)
                 seen = replace(
                     nuisances, readings=colour.on(nuisances.readings), noise=colour.of_force(nuisances.noise)
@@ -306,7 +315,7 @@ class Posterior:
             together: list[Any] = [np.concatenate(each) for each in zip(*found, strict=True)]
             return Innovations(*together)
 
-        found = value_and_slopes(run, values, use)
+        [found] = values_and_slopes(run, values[None], use)
         return found.value, found.gradient
 
     def structure(self, theta: Float[np.ndarray, " unknowns"], lane: int = 0) -> Structure:
@@ -324,6 +333,19 @@ class Posterior:
         grid = Grid(float(nuisances.record.dt), nuisances.inputs.substeps)
         slots = {"smooth_slots": _slot_bucket(structure), "grid": grid, "rolled": True}
         return _Part.of(structure, [unknowns[k] for k in mine], nuisances, mine, slots)
+
+
+def _filtered(scene: Scene, runs: Runs, until: int) -> Innovations:
+    """Innovations (lanes, until, channels) of all lanes."""
+    return (linear_innovations if is_linear(scene) else innovations_of)(scene, runs, until)
+
+
+def _alike(parts: "Sequence[_Part]", lanes: np.ndarray) -> list[list[int]]:
+    """These lanes, those together of which one scene is that of all: they differ in numbers only."""
+    together: dict[Hashable, list[int]] = {}
+    for lane in lanes:
+        together.setdefault(parts[lane].fixed, []).append(int(lane))
+    return list(together.values())
 
 
 def beginnings(posteriors: Sequence[Posterior], slacks: Sequence[float]) -> Float[np.ndarray, "slacks posteriors"]:
@@ -358,6 +380,10 @@ class _Part:
     log: np.ndarray
     tie: np.ndarray
     scenes: dict[int, Scene] = field(default_factory=dict)
+
+    @cached_property
+    def fixed(self) -> Hashable:
+        return besides_numbers(self.plant)
 
     def scene(self, nuisances: Nuisances, until: int) -> Scene:
         """`of_record` of the record that the part was made for, made once."""
