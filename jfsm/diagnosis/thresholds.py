@@ -118,13 +118,7 @@ class Thresholds:
         0.02, "share", "That gain as a share of what refitted own values gain, at which they are refused.", _BLIND
     )
     other_shapes_of_one: float = _number(
-        0.1, "share", "That gain as a share of what a single effect gains, at which it is refused.", _BLIND
-    )
-    other_shapes_of_two: float = _number(
-        0.05,
-        "share",
-        "That gain as a share of what the second of two effects gains, at which both are refused.",
-        _BLIND,
+        0.1, "share", "That gain as a share of what the last effect gains, at which it is refused.", _BLIND
     )
     other_shapes_white: float = _number(
         15.0, "nats", "The same as `other_shapes` where innovations are white, and chance is known.",

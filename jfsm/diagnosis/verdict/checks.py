@@ -249,12 +249,12 @@ CHECKS: Mapping[str, Kind] = {
         "<=",
         "nats",
         "Forces of other shapes would gain only a small share of what it gains itself (a score test), and would not "
-        "explain half of innovations that are not white.",
+        "explain half of innovations that are not white. Two laws leave white ones.",
         (
             "other_shapes",
             "other_shapes_of_values",
             "other_shapes_of_one",
-            "other_shapes_of_two",
+            "white",
             "other_shapes_white",
             "other_shapes_of_white",
             "rest_with_shape",

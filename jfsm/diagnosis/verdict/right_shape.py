@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..evidence.scorecard import CONSTANT_FORCE, OtherShapes, Scorecard
+from ..evidence.scorecard import CONSTANT_FORCE, EffectCard, OtherShapes, Scorecard
 from ..nats import shown
 from .bench import Bench
 from .checks import Check
@@ -21,19 +21,26 @@ def doubt(card: Scorecard, gained: float, bench: Bench, *, shapeless: bool = Fal
     """How far other shapes speak against a hypothesis whose last effect gained so many nats, and the check: above 1,
     too far, it fails.
 
-    With `shapeless` the share of the innovations that they explain is not asked. Of both the check has the one that is
-    the nearer to its limit.
+    With `shapeless` only that gain is asked for. Without it also which share of the innovations they explain, and the
+    check has what is the nearer to its limit; two laws must leave innovations that are white, since two wrong ones
+    together come near most forces.
     """
     limits, shapes = bench.limits, bench.evidence.other_shapes(card.key)
     white = bench.white(card)
-    share = (limits.other_shapes_of_values, limits.other_shapes_of_one, limits.other_shapes_of_two)[len(card.effects)]
+    share = limits.other_shapes_of_one if card.effects else limits.other_shapes_of_values
     least = limits.other_shapes_white if white else limits.other_shapes
     much = (limits.other_shapes_of_white if white else share) * gained
     far = max(shapes.nats - least, 0.0) / max(much - least, least)
     limit = max(much, 2 * least)
     says = _says(shapes, limit, bench)
+    if white or shapeless:
+        return far, bench.check("right_shape", card.key, shapes.nats, limit, says)
+    if len(_laws(card)) > 1:
+        says = f"its innovations correlate by {card.whiteness:.2g} from sample to sample; two laws must leave none"
+        row = bench.check("right_shape", card.key, card.whiteness, limits.white, says, "correlation")
+        return 0.0 if row.passed else card.whiteness / limits.white, row
     rest = limits.rest_with_shape
-    if white or shapeless or shapes.share / rest <= shapes.nats / limit:
+    if shapes.share / rest <= shapes.nats / limit:
         return far, bench.check("right_shape", card.key, shapes.nats, limit, says)
     says = f"forces of other shapes would explain {shapes.share:.0%} of what it leaves; {rest:.0%} at most may be left"
     row = bench.check("right_shape", card.key, shapes.share, rest, says, "share of the innovations' power")
@@ -140,7 +147,10 @@ def _not_identifiable(card: Scorecard, bench: Bench) -> Check | None:
 
 def _both_unseen(card: Scorecard, bench: Bench) -> Check | None:
     """Two laws that only their evidence speaks for are no finding; a constant force is no such law."""
-    laws = [law for law in card.laws if law.role != CONSTANT_FORCE]
-    if len(laws) < 2 or bench.shows(bench.refitted):
+    if len(_laws(card)) < 2 or bench.shows(bench.refitted):
         return None
     return bench.check("identifiable_here", card.key, 1, 0, _UNSEEN)
+
+
+def _laws(card: Scorecard) -> list[EffectCard]:
+    return [law for law in card.laws if law.role != CONSTANT_FORCE]
