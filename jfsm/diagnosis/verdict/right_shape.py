@@ -126,8 +126,7 @@ def nearest(winner: Scorecard, bench: Bench) -> tuple[str, ...]:
     """
     if bench.white(winner):
         return ()
-    least = bench.limits.half if len(winner.effects) == 1 else bench.limits.almost_all
-    kin = [card for card in (winner, *_alike(winner, bench)) if bench.explained(card) >= least]
+    kin = [card for card in (winner, *_alike(winner, bench)) if _is_near(card, bench)]
     if not kin:
         return ()
     strays = np.array([max(bench.evidence.other_shapes(card.key).strays, 1e-9) for card in kin])
@@ -137,6 +136,13 @@ def nearest(winner: Scorecard, bench: Bench) -> tuple[str, ...]:
     for card, factor in zip(kin, after / before, strict=True):
         bench.less_sure([card.key], "run over all that was fitted", float(factor))
     return tuple(kin[i].key for i in np.argsort(-weighed, kind="stable"))
+
+
+def _is_near(card: Scorecard, bench: Bench) -> bool:
+    """Whether a law explains enough for its class to be right; two must explain almost all, and leave next to nothing."""
+    if len(card.effects) == 1:
+        return bench.explained(card) >= bench.limits.half
+    return bench.explained(card) >= bench.limits.almost_all and bench.left(card) < bench.limits.negligible
 
 
 def _not_identifiable(card: Scorecard, bench: Bench) -> Check | None:
