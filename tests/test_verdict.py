@@ -285,6 +285,8 @@ def test_of_laws_alike_the_one_whose_shape_is_right_is_named(nats: float, named:
         (0.002, 0.4, (), None, True),
         (0.002, 0.02, (), None, False),
         (0.002, 0.4, ("preload",), None, True),
+        (0.002, 0.4, ("cubic_hardening",), None, False),
+        (0.0002, 0.4, ("cubic_hardening",), None, True),
         (0.002, 0.4, (), 0.01, True),
     ],
 )

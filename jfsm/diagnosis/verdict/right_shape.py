@@ -139,8 +139,8 @@ def nearest(winner: Scorecard, bench: Bench) -> tuple[str, ...]:
 
 
 def _is_near(card: Scorecard, bench: Bench) -> bool:
-    """Whether a law explains enough for its class to be right; two must explain almost all, and leave next to nothing."""
-    if len(card.effects) == 1:
+    """Whether a law explains enough for its class to be right; two must explain almost all and leave nothing."""
+    if len(_laws(card)) < 2:
         return bench.explained(card) >= bench.limits.half
     return bench.explained(card) >= bench.limits.almost_all and bench.left(card) < bench.limits.negligible
 
