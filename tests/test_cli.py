@@ -773,6 +773,9 @@ def test_a_file_that_says_nothing_of_its_channels_is_listed_with_the_command_to_
     proposal = " ".join(result.stdout.partition("To go on: ")[2].split())
     assert proposal == f"jfsm diagnose '{path}' --force Kraft --displacement Weg --model MODEL.toml"
     assert "must say when" not in result.stdout
+    result = run("inspect", path, "--out-units", "in,lbf")
+    assert result.exit_code == 0 and "numbers above are as they stand in the file" in flat(result.stderr)
+    assert "furlong" in refusal("inspect", path, "--out-units", "furlong")
 
 
 def test_a_file_that_says_nothing_of_its_channels_has_a_page_with_a_picture_of_each(tmp_path):

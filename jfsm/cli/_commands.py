@@ -48,7 +48,10 @@ def inspect(
         if report is not None:
             with said_in_options():
                 found.report(report, proposal)
+        asked = shown_units(out_units)
         show_listing(found, proposal)
+        if asked is not None:
+            say("--out-units waits until channels are named: the numbers above are as they stand in the file")
         return
     record = source.read()
     units, inspection = shown_units(out_units, record), record.inspect()
