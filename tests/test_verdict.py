@@ -924,6 +924,13 @@ def test_another_threshold_gives_another_verdict_and_every_number_is_explained()
     assert all(number.unit and number.means and number.source for number in THRESHOLDS.explained().values())
 
 
+def test_a_trace_that_is_likelier_than_a_sensors_fault_is_what_stops_the_verdict():
+    laws = card(1128.0, 0.0, "coulomb"), card(1120.0, 0.0, "cubic_hardening")
+    decision = judged(refit(1000.0, 0.0), *laws, card(1100.0, 0.0, "force_gain"))
+    assert decision.verdict == "undecided" and decision.stopped_by is not None
+    assert (decision.stopped_by.name, decision.stopped_by.of) == ("more_than_a_trace", FRICTION)
+
+
 @pytest.mark.parametrize(("numbers", "winner"), [(4, "cubic_damping@0-1+cubic_hardening@0-1"), (1, "bouc_wen@0-1")])
 def test_two_laws_need_not_pay_beside_one_that_has_as_many_numbers(numbers: int, winner: str):
     one = card(9000.0, 0.0008, "bouc_wen", unknowns=4 + numbers)

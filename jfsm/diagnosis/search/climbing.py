@@ -16,7 +16,9 @@ from .batches import Batch, Schedule
 FAR_BEHIND = 200.0
 """Nats behind the leader, one per cent of unmodelled force forgiven, from which a candidate is not pursued,"""
 _ALWAYS_PURSUED = 4
-"""unless it is among the best of them."""
+"""unless it is among the best of them;"""
+_TO_THE_TOP = 2
+"""nor to its top, unless it is among so many."""
 _BLIND = 10.0
 """Error power, in those of another start of the same effects, from which a start predicts nothing, whatever its
 evidence."""
@@ -64,7 +66,7 @@ def climbed(batches: Sequence[Batch], schedule: Schedule, kept: Sequence[Batch],
     Once the time is over they stay where they are, and those that are not at their tops are left behind.
     """
     pursued = _through_stages(batches, schedule, kept, tell)
-    near = _near(pursued, _ALWAYS_PURSUED, best.rung)
+    near = _near(pursued, _TO_THE_TOP, best.rung)
     pursued = [b for b in pursued if b in near or (schedule.to_the_end and b in kept)]
     trials = _at_their_tops(pursued, best.value, tell)
     return Found(trials, _left_behind(batches, pursued, trials))

@@ -56,7 +56,10 @@ def _is_a_trace(winner: Scorecard, bench: Bench) -> bool:
     likeliest = max((card.evidence for card in _single_laws(bench) if not shares_a_class(card, winner)), default=known)
     share = (likeliest - known) / (winner.evidence - known)
     says = f"laws of other classes gain {share:.0%} of what it gains, where the refitted model leaves nothing"
-    return not bench.check("more_than_a_trace", winner.key, share, bench.limits.nearly_all, says).passed
+    row = bench.check("more_than_a_trace", winner.key, share, bench.limits.nearly_all, says)
+    if not row.passed:
+        bench.stop(row)
+    return not row.passed
 
 
 def _single_laws(bench: Bench) -> list[Scorecard]:
