@@ -299,18 +299,21 @@ def run(
     `plants`, `assumed` and `states` have a leading axis of lanes on every leaf that is no whole number, states on all.
     A sample with ``use = 0`` is predicted, not used: many of them in a row are a free prediction with its error bar. A
     delay reaches back into the means of the filter. Lanes share what rarely happens, a reversal: all pay when one of
-    them has it. As `one_kernel` the loop is faster where it can be one.
+    them has it. As `one_kernel` the loop is faster where it can be one; where it cannot, the steps of a sample are one.
     """
     of_zeros, alone = zeros_of(assumed), on_lanes(plants).first()
 
+    whole = one_kernel and few_states(alone, of_zeros)
+    advanced = as_one_kernel(_advanced) if one_kernel and not whole and alone.elementary else _advanced
+
     def loop(plants, known, observation, dt, states, stretch):
         def sample(states, now):
-            states, passage = _sample(on_lanes(plants), known, observation, of_zeros, dt, states, now)
+            states, passage = _sample(on_lanes(plants), known, observation, of_zeros, dt, states, now, advanced)
             return states, passage.seen
 
         return jax.lax.scan(sample, states, stretch)
 
-    run_all = as_one_kernel(loop) if one_kernel and few_states(alone, of_zeros) else loop
+    run_all = as_one_kernel(loop) if whole else loop
     return run_all(plants, on_lanes(plants)(Known.of, assumed), observation, dt, states, stretch)
 
 
@@ -319,7 +322,7 @@ def passages(
 ) -> tuple[State, Passage]:
     """As `run`, with all of every sample's `Passage` (n, lanes, ...)."""
     each = on_lanes(plants)
-    sample = partial(_sample, each, each(Known.of, assumed), observation, zeros_of(assumed), dt)
+    sample = partial(_sample, each, each(Known.of, assumed), observation, zeros_of(assumed), dt, advanced=_advanced)
     return jax.lax.scan(sample, states, stretch)
 
 
@@ -328,7 +331,9 @@ def few_states(plant: Plant, zeros: tuple[int | None, ...]) -> bool:
     return 2 * plant.dof + plant.hidden + len(zeros) <= _FEW and plant.elementary
 
 
-def _sample(each: Lanes, known: Known, observation, of_zeros, dt, states: State, now: Stretch) -> tuple[State, Passage]:
+def _sample(
+    each: Lanes, known: Known, observation, of_zeros, dt, states: State, now: Stretch, advanced: Callable[..., Motion]
+) -> tuple[State, Passage]:
     """States of all lanes after a sample, and how they went through it."""
     force, base = jnp.moveaxis(now.force, 1, 0), now.base  # (lanes, halves, dof)
     substeps = (base.size - 1) // 2
@@ -339,7 +344,7 @@ def _sample(each: Lanes, known: Known, observation, of_zeros, dt, states: State,
         return (*_read(plant, known, observation, of_zeros, state, load, before, now.values, now.use), g)
 
     motion, updated, zeros, buffer, told, g = each(read, known, states, force, now.before)
-    after = _advanced(each, known, motion, g, base, now.time, dt)
+    after = advanced(each, known, motion, g, base, now.time, dt)
 
     def carry_on(plant, known, motion, after, updated, g):
         return _carried_on(plant, known, motion, after, updated, g[substeps], now.time, dt, substeps)
