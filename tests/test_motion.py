@@ -1,5 +1,7 @@
 """Motion from whatever was measured of it: against motions made by SciPy, and the smoother against plain algebra."""
 
+import re
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -58,9 +60,23 @@ def test_what_was_not_measured_is_found_from_what_was(hardening, kinds, largest)
     for place, truth in enumerate(hardening):
         shown = (found.displacement, found.velocity, found.acceleration)[place][:, 0]
         assert 0.85 < np.mean(np.abs(shown - truth) < 1.96 * found.std[:, 0, place])
+    assert len(found.notes) == ("displacement" not in kinds)
     assert found.drift == {}  # a drift that is not there is not bought
     for kind in kinds:
         assert found.noise[kind][0] == pytest.approx(0.01 * np.std(hardening[names.index(kind)]), rel=0.2)
+
+
+@pytest.mark.parametrize(("kind", "times"), [("velocity", 1), ("acceleration", 2)])
+def test_a_displacement_that_no_channel_shows_is_said_to_drown_when_its_noise_is_integrated_so_long(
+    hardening, kind, times
+):
+    record = jfsm.Record(TIME, **{kind: noisy(hardening[times], 0.05)})
+    found = jfsm.estimate_motion(record)
+    [seconds] = map(float, re.findall(r"slower than about (\S+) s", " ".join(found.notes)))
+    strayed = found.noise[kind][0] * np.random.default_rng(0).standard_normal((500, round(seconds / DT)))
+    for _ in range(times):
+        strayed = DT * np.cumsum(strayed, 1)
+    assert np.std(strayed[:, -1]) == pytest.approx(np.std(found.displacement), rel=0.15)
 
 
 def test_a_bias_of_an_accelerometer_moves_nothing_and_is_told(hardening):

@@ -53,6 +53,8 @@ class Motion:
         Force that acts there beside all that the model has and the record measured, and its standard error, in the
         record's unit (N). It stands on the left-hand side, restoring side positive: an unmeasured load has its
         opposite sign.
+    notes : tuple of str
+        What the channels cannot tell, and the error bars therefore do not hold.
     """
 
     time: Float[np.ndarray, " n"]
@@ -67,6 +69,7 @@ class Motion:
     places: tuple[Place, ...] = ()
     latent_force: Float[np.ndarray, "n places"] | None = None
     latent_force_std: Float[np.ndarray, "n places"] | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def std(self) -> Float[np.ndarray, "n dof 3"]:
@@ -119,7 +122,9 @@ def estimate_motion(
     Where `places` is left out and the channels do not tell the forces on all degrees of freedom apart, these count as
     equally large; what rests on which of them acts has an error bar that says so.
 
-    The error bars are those of a linear structure with Gaussian forces; numbers learned count as known.
+    The error bars are those of a linear structure with Gaussian forces; numbers learned count as known. Where no model
+    is given and no channel shows a displacement, a shift that lasts is not told: `notes` say so, with the time from
+    which slow motion drowns in noise that is integrated.
     """
     require_x64()
     if not record.responses:
@@ -140,7 +145,32 @@ def estimate_motion(
                 "Pass the structure, whose links tell what moves it."
             )
     estimates = [_Estimate.of(Part.of_dof(record, j)) for j in range(1, record.dofs + 1)]
-    return _together(record, estimates, record.dofs)
+    found = _together(record, estimates, record.dofs)
+    return replace(found, notes=_untold(found, record))
+
+
+def _untold(found: Motion, record: Record) -> tuple[str, ...]:
+    """What is to be said of degrees of freedom whose displacement no channel shows.
+
+    White noise of standard deviation s, n times integrated over a time T, strays by s·sqrt(Δt·T^(2n - 1)·c) with c = 1
+    for n = 1 and 1/3 for n = 2; `T` is where that is as much as the displacement's own spread.
+    """
+    notes = list[str]()
+    for j in range(1, record.dofs + 1):
+        orders = {kind: n for kind, n in (("velocity", 1), ("acceleration", 2)) if (kind, j) in record.responses}
+        if ("displacement", j) in record.responses or not orders:
+            continue
+        kind, n = next(iter(orders.items()))
+        among = [dof for of, dof in record.responses if of == kind]
+        noise, spread = float(found.noise[kind][among.index(j)]), float(np.std(found.displacement[:, j - 1]))
+        strays = noise**2 * record.dt / (1 if n == 1 else 3)
+        seconds = (spread**2 / max(strays, np.finfo(float).tiny)) ** (1 / (2 * n - 1))
+        notes.append(
+            f"The displacement of {j} rests on its {kind} alone: it is that of a motion about a place that stays. A "
+            f"shift that lasts, and motion slower than about {seconds:.2g} s, hardly show beside the noise of that "
+            f"channel; the error bars do not hold them. Measure a displacement to know."
+        )
+    return tuple(notes)
 
 
 def _with_model(record: Record, model: Structure, places: Sequence[Place] | None) -> Motion:
