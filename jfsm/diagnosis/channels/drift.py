@@ -11,16 +11,39 @@ _DEGREE = 5
 """Of the polynomials of time that stand for what is slow."""
 _PERIODS = 2 * _DEGREE
 """Of the motion, from which these are slow beside it."""
-PLAINLY, SLOWLY = 0.25, 0.05
+_PLAINLY, _SLOWLY = 0.25, 0.05
 """Share of a channel's innovations that is slow, from which its zero may wander: beside the model alone, of which what
 it lacks may be slow as well, and beside the likeliest law."""
 
 
-def wandering(beside: Trial, problem: Problem, least: float) -> int | None:
-    """The channel whose zero wanders beside a trial, or None; one that is known to do so is none.
+def plainly_wandering(beside: Trial, problem: Problem) -> int | None:
+    """The channel whose zero wanders beside the model alone, or None; one that is known to do so is none."""
+    return _channel(_wandering(beside, problem, _PLAINLY))
 
-    At `least` that share of its innovations is slow, and they are far likelier where the zero may wander.
-    """
+
+def slowly_wandering(beside: Trial, problem: Problem) -> int | None:
+    """As `plainly_wandering`, beside the likeliest law, which leaves less."""
+    return _channel(_wandering(beside, problem, _SLOWLY))
+
+
+def mostly_wandering(beside: Trial, problem: Problem) -> int | None:
+    """As `slowly_wandering`, where the wandering zero takes half of the covariance of the channel's innovations from
+    sample to sample: what another law would explain is in part slow, too."""
+    found = _wandering(beside, problem, _SLOWLY)
+    if found is None:
+        return None
+    channel, wandered = found
+    before, after = (_carried_over(p, beside, channel) for p in (problem.posterior_of(beside), wandered))
+    return channel if after < THRESHOLDS.half * before else None
+
+
+def _channel(found: tuple[int, Posterior] | None) -> int | None:
+    return None if found is None else found[0]
+
+
+def _wandering(beside: Trial, problem: Problem, least: float) -> tuple[int, Posterior] | None:
+    """The channel of whose innovations at least that share is slow, the most of all, and the posterior in which its
+    zero may wander; None where that is not far likelier."""
     periods = [until * n.record.dt / n.period for n, until in zip(problem.records, problem.until, strict=True)]
     if problem.imposed or min(periods) < _PERIODS:
         return None
@@ -32,7 +55,13 @@ def wandering(beside: Trial, problem: Problem, least: float) -> int | None:
         return None
     wandered = problem.with_wandering(channel).posterior_of(beside)
     gain = cost(posterior, beside.theta) - cost(wandered, beside.theta)
-    return channel if gain > THRESHOLDS.searched else None
+    return (channel, wandered) if gain > THRESHOLDS.searched else None
+
+
+def _carried_over(posterior: Posterior, beside: Trial, channel: int) -> float:
+    """Sum of the products of a channel's innovations and those of the next samples."""
+    each = [standardised(posterior, beside.theta, index)[:, channel] for index in range(len(posterior.records))]
+    return float(sum(error[1:] @ error[:-1] for error in each))
 
 
 def _slow(posterior: Posterior, beside: Trial, index: int) -> np.ndarray:

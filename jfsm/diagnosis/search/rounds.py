@@ -12,7 +12,7 @@ from ...structures import ChannelDelay, ForceDelay
 from ..channels.clock import in_its_time
 from ..channels.coloured_noise import coloured
 from ..channels.delays import gain_of_delay, seems_late, slightly_late
-from ..channels.drift import SLOWLY, wandering
+from ..channels.drift import mostly_wandering, slowly_wandering
 from ..evidence.excess import explained, is_noise_only
 from ..evidence.fitted import Trial
 from ..evidence.identifiable import in_step
@@ -79,16 +79,16 @@ class Rounds:
         singles = Searched(given, refitted, trials, found.behind, left_out, self._lack)
         if self._limit.over:
             return singles, None
-        best = self._likeliest(singles.every)
-        explains = best if explained(best, refitted) >= THRESHOLDS.half else refitted
-        other = self._with_other_times(singles.every) or self._with_other_noise(explains)
-        effects = self._second_effects(singles) if self.pairs and other is None else []
-        if not effects:
+        other = self._with_other_times(singles.every) or self._with_other_noise(singles, mostly_wandering)
+        if other is not None:
             return singles, other
-        both = self._pairs(effects, best, singles, louder)
+        effects = self._second_effects(singles) if self.pairs else []
+        if not effects:
+            return singles, self._with_other_noise(singles, slowly_wandering)
+        both = self._pairs(effects, self._likeliest(singles.every), singles, louder)
         if self._limit.over:
             return both, None
-        return both, self._with_other_times(both.every) or coloured(self._likeliest(both.every), self.problem)
+        return both, self._with_other_times(both.every) or self._with_other_noise(both, slowly_wandering)
 
     @property
     def _limit(self) -> Limit:
@@ -201,13 +201,15 @@ class Rounds:
                 return found
         return None
 
-    def _with_other_noise(self, best: Trial) -> Problem | None:
+    def _with_other_noise(self, found: Searched, wandering: Callable[[Trial, Problem], int | None]) -> Problem | None:
         """The problem with the noise that a channel turns out to have beside the best that explains something; None
         where none has."""
-        other = coloured(best, self.problem)  # noise that remembers is in part slow as well
+        best = self._likeliest(found.every)
+        beside = best if explained(best, found.refitted) >= THRESHOLDS.half else found.refitted
+        other = coloured(beside, self.problem)  # noise that remembers is in part slow as well
         if other is not None:
             return other
-        channel = wandering(best, self.problem, SLOWLY)
+        channel = wandering(beside, self.problem)
         return None if channel is None else self.problem.with_wandering(channel)
 
     # Pairs
