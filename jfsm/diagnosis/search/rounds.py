@@ -83,12 +83,17 @@ class Rounds:
         if other is not None:
             return singles, other
         effects = self._second_effects(singles) if self.pairs else []
-        if not effects:
-            return singles, self._with_other_noise(singles, slowly_wandering)
-        both = self._pairs(effects, self._likeliest(singles.every), singles, louder)
+        both = self._pairs(effects, self._likeliest(singles.every), singles, louder) if effects else singles
         if self._limit.over:
             return both, None
-        return both, self._with_other_times(both.every) or self._with_other_noise(both, slowly_wandering)
+        other = self._with_other_times(both.every) if effects else None
+        return both, other or self._unless_settled(both, singles)
+
+    def _unless_settled(self, both: Searched, singles: Searched) -> Problem | None:
+        """The problem with other noise, beside what two effects leave, or what one does."""
+        if is_noise_only(self._likeliest(both.every)):
+            return None
+        return next(filter(None, (self._with_other_noise(each, slowly_wandering) for each in (both, singles))), None)
 
     @property
     def _limit(self) -> Limit:
