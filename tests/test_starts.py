@@ -259,6 +259,17 @@ def test_the_force_along_a_given_motion_is_that_of_the_law(term, expected):
         np.testing.assert_allclose(found[1:], expected(T)[1:], atol=2e-3)
 
 
+@pytest.mark.parametrize("bend", [0.3, 0.003])
+def test_bristles_are_followed_in_few_steps_however_stiff(bend):
+    """They slide after so small a displacement that eight of the usual steps between samples run away."""
+    x, v = np.cos(1.3 * T), -1.3 * np.sin(1.3 * T)
+    law = jfsm.LuGre(1.0, 1.4, 0.3, 1.0 / bend, 0.02, at=(0, 1))
+    motion = (jnp.asarray(q) for q in (x[:, None], v[:, None], T))
+    fine = np.asarray(force_along(lower(jfsm.Structure([1.0], [law])), *motion, substeps=512))[:, 0]
+    found = forces_of_law(jfsm.LuGre, np.array([law.values], dtype=float), x, v, T)[0]
+    np.testing.assert_allclose(found[1:], fine[1:], atol=0.05)
+
+
 def test_shapes_too_stiff_for_the_samples_leave_the_others_to_begin_from():
     fine = record(lambda x, v: np.tanh(v / 0.3))
     assert fine.force is not None and fine.displacement is not None and fine.velocity is not None

@@ -27,6 +27,7 @@ from ..structures import (
 )
 from ._along import HIDDEN_SUBSTEPS
 from ._grid import delayed_along
+from ._kernel import as_one_kernel, jit_with_kernels
 from ._plant import LAW_PARAMETERS, Plant, Slots, hidden_width, numbers_of
 from ._stepper import runge_kutta
 
@@ -100,10 +101,15 @@ def _answering_the_past(plant: Plant, numbers, d, w, time):
     return jax.vmap(one)(numbers)
 
 
-@partial(jax.jit, static_argnums=0)
-def _remembered(laws: tuple[type[AbstractTerm], ...], chosen, numbers, d, w, time, substeps):
-    along = partial(_remembering, laws, chosen)
-    return jax.vmap(along, in_axes=(0, None, None, None, None))(numbers, d, w, time, substeps)
+@jit_with_kernels
+def _remembered(
+    laws: tuple[type[AbstractTerm], ...], chosen, numbers, d, w, time, substeps, *, one_kernel: bool
+) -> Float[Array, "rows n"]:
+    def loop(chosen, numbers, *motion):
+        return jax.vmap(partial(_remembering, laws, chosen), in_axes=(0, *(None,) * len(motion)))(numbers, *motion)
+
+    run = as_one_kernel(loop) if one_kernel and laws == MEMORY_TERMS else loop
+    return run(chosen, numbers, d, w, time, substeps)
 
 
 def _remembering(laws: tuple[type[AbstractTerm], ...], chosen, row, d, w, time, substeps) -> Float[Array, " n"]:
@@ -117,13 +123,18 @@ def _remembering(laws: tuple[type[AbstractTerm], ...], chosen, row, d, w, time, 
         d0, d1, w0, w1, t = inputs
 
         def substep(i, z):
-            begin, end = i / substeps, (i + 1) / substeps
+            begin, end, h = i / substeps, (i + 1) / substeps, step / substeps
+            middle = (begin + end) / 2
 
             def along(law):
                 def rate(z, s):
                     return law.state_rate(d0 + s * (d1 - d0), w0 + s * (w1 - w0), z, t + s * step)
 
-                after = runge_kutta(rate, z[: law.states], step / substeps, (begin, (begin + end) / 2, end))
+                fading, z0 = law.fading(w0 + middle * (w1 - w0)), z[: law.states]
+                if fading is None:
+                    after = runge_kutta(rate, z0, h, (begin, middle, end))
+                else:  # exact for a speed that stays: however stiff, in any step
+                    after = z0 + h * _mean_of_what_fades(fading * h) * rate(z0, middle)
                 return law.settle(d0 + end * (d1 - d0), after)
 
             return of_law(along)
@@ -134,3 +145,9 @@ def _remembering(laws: tuple[type[AbstractTerm], ...], chosen, row, d, w, time, 
     after = [jnp.concatenate([q[1:], q[-1:]]) for q in (d, w)]
     start = of_law(lambda law: law.initial_state(d[0], w[0]))
     return jax.lax.scan(sample, start, (d, after[0], w, after[1], time))[1]
+
+
+def _mean_of_what_fades(x):
+    """Mean of exp(-s) from 0 to `x` ≥ 0."""
+    small = x < 1e-6
+    return jnp.where(small, 1.0 - x / 2, -jnp.expm1(-x) / jnp.where(small, 1.0, x))

@@ -143,6 +143,11 @@ class AbstractTerm(eqx.Module):
         """Rate of the hidden states (states,)."""
         return jnp.zeros(self.states)
 
+    def fading(self, w: Scalar) -> Scalar | None:
+        """Rate [1/s] at which hidden states fade, each in proportion to itself and the faster the faster the link
+        moves; None where they do not."""
+        return None
+
     def initial_state(self, d: Scalar, w: Scalar) -> Any:
         """Hidden states (states,) at rest with the link at `d`, `w`: relaxed."""
         return jnp.zeros(self.states)

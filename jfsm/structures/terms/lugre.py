@@ -37,9 +37,12 @@ class LuGre(AbstractTerm):
     )
     states = 1
 
-    def _bend_rate(self, w, z):
+    def fading(self, w):
         h = stribeck_force(self.F, self.F_static, self.v_s, w)
-        return w - self.sigma0 * jnp.abs(w) * z / jnp.where(h > ABOVE_ZERO, h, 1.0)
+        return self.sigma0 * jnp.abs(w) / jnp.where(h > ABOVE_ZERO, h, 1.0)
+
+    def _bend_rate(self, w, z):
+        return w - self.fading(w) * z
 
     def force(self, d, w, z, t):
         return self.sigma0 * z[0] + self.sigma1 * self._bend_rate(w, z[0])
