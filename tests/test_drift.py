@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jfsm
-from jfsm.diagnosis.channels.drift import mostly_wandering, plainly_wandering, slowly_wandering
+from jfsm.diagnosis.channels.drift import PLAINLY, SLOWLY, wandering
 from jfsm.diagnosis.evidence.setup import Problem
 from jfsm.diagnosis.search.baseline import believed
 from jfsm.identification import prepare
@@ -31,7 +31,8 @@ def found_beside_the_model(k2: float, drift: float):
     slow = drift * np.std(y[0]) * np.sin(2.5 * TIME / TIME[-1])
     record = jfsm.Record(TIME, read[0], displacement=read[1] + slow, acceleration=read[2], at_rest=True)
     problem, _, refitted = believed(Problem(MODEL, [prepare(record, MODEL)], [1200]))
-    return tuple(ask(refitted, problem) for ask in (mostly_wandering, slowly_wandering, plainly_wandering))
+    asked = (SLOWLY, True), (SLOWLY, False), (PLAINLY, False)
+    return tuple(wandering(refitted, problem, least, mostly=mostly) for least, mostly in asked)
 
 
 @pytest.mark.parametrize(

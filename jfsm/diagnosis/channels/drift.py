@@ -11,51 +11,34 @@ _DEGREE = 5
 """Of the polynomials of time that stand for what is slow."""
 _PERIODS = 2 * _DEGREE
 """Of the motion, from which these are slow beside it."""
-_PLAINLY, _SLOWLY = 0.25, 0.05
-"""Share of a channel's innovations that is slow, from which its zero may wander: beside the model alone, of which what
-it lacks may be slow as well, and beside the likeliest law."""
+PLAINLY, SLOWLY = 0.25, 0.05
+"""Share of a channel's innovations that is slow, from which its zero may wander: with the model alone, where what it
+lacks may be slow as well, and with the likeliest law."""
 
 
-def plainly_wandering(beside: Trial, problem: Problem) -> int | None:
-    """The channel whose zero wanders beside the model alone, or None; one that is known to do so is none."""
-    return _channel(_wandering(beside, problem, _PLAINLY))
+def wandering(fitted: Trial, problem: Problem, least: float, *, mostly: bool = False) -> int | None:
+    """The channel whose zero wanders in a fitted trial, or None; one that is known to do so is none.
 
-
-def slowly_wandering(beside: Trial, problem: Problem) -> int | None:
-    """As `plainly_wandering`, beside the likeliest law, which leaves less."""
-    return _channel(_wandering(beside, problem, _SLOWLY))
-
-
-def mostly_wandering(beside: Trial, problem: Problem) -> int | None:
-    """As `slowly_wandering`, where the wandering zero takes half of the covariance of the channel's innovations from
-    sample to sample: what another law would explain is in part slow, too."""
-    found = _wandering(beside, problem, _SLOWLY)
-    if found is None:
-        return None
-    channel, wandered = found
-    before, after = (_carried_over(p, beside, channel) for p in (problem.posterior_of(beside), wandered))
-    return channel if after < THRESHOLDS.half * before else None
-
-
-def _channel(found: tuple[int, Posterior] | None) -> int | None:
-    return None if found is None else found[0]
-
-
-def _wandering(beside: Trial, problem: Problem, least: float) -> tuple[int, Posterior] | None:
-    """The channel of whose innovations at least that share is slow, the most of all, and the posterior in which its
-    zero may wander; None where that is not far likelier."""
+    At `least` that share of its innovations is slow, and they are far likelier where the zero may wander. What another
+    law would explain is in part slow, too: where the drift must be `mostly` what is left, the wandering zero has to
+    take half of the covariance of the channel's innovations from sample to sample.
+    """
     periods = [until * n.record.dt / n.period for n, until in zip(problem.records, problem.until, strict=True)]
     if problem.imposed or min(periods) < _PERIODS:
         return None
-    posterior, known = problem.posterior_of(beside), problem.first.readings.wandering
-    shares = np.mean([_slow(posterior, beside, index) for index in range(len(problem.records))], 0)
+    posterior, known = problem.posterior_of(fitted), problem.first.readings.wandering
+    shares = np.mean([_slow(posterior, fitted, index) for index in range(len(problem.records))], 0)
     shares[list(known)] = 0.0
     channel = int(np.argmax(shares))
     if shares[channel] < least:
         return None
-    wandered = problem.with_wandering(channel).posterior_of(beside)
-    gain = cost(posterior, beside.theta) - cost(wandered, beside.theta)
-    return (channel, wandered) if gain > THRESHOLDS.searched else None
+    wandered = problem.with_wandering(channel).posterior_of(fitted)
+    if cost(posterior, fitted.theta) - cost(wandered, fitted.theta) <= THRESHOLDS.searched:
+        return None
+    if not mostly:
+        return channel
+    before, after = (_carried_over(p, fitted, channel) for p in (posterior, wandered))
+    return channel if after < THRESHOLDS.half * before else None
 
 
 def _carried_over(posterior: Posterior, beside: Trial, channel: int) -> float:

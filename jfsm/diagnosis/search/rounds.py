@@ -12,7 +12,7 @@ from ...structures import ChannelDelay, ForceDelay
 from ..channels.clock import in_its_time
 from ..channels.coloured_noise import coloured
 from ..channels.delays import gain_of_delay, seems_late, slightly_late
-from ..channels.drift import mostly_wandering, slowly_wandering
+from ..channels.drift import SLOWLY, wandering
 from ..evidence.excess import explained, is_noise_only
 from ..evidence.fitted import Trial
 from ..evidence.identifiable import in_step
@@ -79,7 +79,7 @@ class Rounds:
         singles = Searched(given, refitted, trials, found.behind, left_out, self._lack)
         if self._limit.over:
             return singles, None
-        other = self._with_other_times(singles.every) or self._with_other_noise(singles, mostly_wandering)
+        other = self._with_other_times(singles.every) or self._coloured(singles) or self._drifting(singles, mostly=True)
         if other is not None:
             return singles, other
         effects = self._second_effects(singles) if self.pairs else []
@@ -87,13 +87,15 @@ class Rounds:
         if self._limit.over:
             return both, None
         other = self._with_other_times(both.every) if effects else None
-        return both, other or self._unless_settled(both, singles)
+        return both, other or self._with_other_noise(singles, both)
 
-    def _unless_settled(self, both: Searched, singles: Searched) -> Problem | None:
-        """The problem with other noise, beside what two effects leave, or what one does."""
+    def _with_other_noise(self, singles: Searched, both: Searched) -> Problem | None:
+        """The problem with other noise, unless the best hypothesis leaves only noise: judged by pairs first, then by
+        single effects, of which the colour is known."""
         if is_noise_only(self._likeliest(both.every)):
             return None
-        return next(filter(None, (self._with_other_noise(each, slowly_wandering) for each in (both, singles))), None)
+        by_pairs = None if both is singles else self._coloured(both) or self._drifting(both)
+        return by_pairs or self._drifting(singles)
 
     @property
     def _limit(self) -> Limit:
@@ -206,16 +208,20 @@ class Rounds:
                 return found
         return None
 
-    def _with_other_noise(self, found: Searched, wandering: Callable[[Trial, Problem], int | None]) -> Problem | None:
-        """The problem with the noise that a channel turns out to have beside the best that explains something; None
-        where none has."""
-        best = self._likeliest(found.every)
-        beside = best if explained(best, found.refitted) >= THRESHOLDS.half else found.refitted
-        other = coloured(beside, self.problem)  # noise that remembers is in part slow as well
-        if other is not None:
-            return other
-        channel = wandering(beside, self.problem)
+    def _coloured(self, found: Searched) -> Problem | None:
+        """The problem with the autocorrelated noise that channels turn out to have; None where none has."""
+        return coloured(self._explaining(found), self.problem)
+
+    def _drifting(self, found: Searched, *, mostly: bool = False) -> Problem | None:
+        """The problem with the zero that turns out to wander, or None. Noise that remembers is in part slow as well: it
+        is looked for before."""
+        channel = wandering(self._explaining(found), self.problem, SLOWLY, mostly=mostly)
         return None if channel is None else self.problem.with_wandering(channel)
+
+    def _explaining(self, found: Searched) -> Trial:
+        """The likeliest hypothesis, where it explains half of what the refitted model leaves; else that model."""
+        best = self._likeliest(found.every)
+        return best if explained(best, found.refitted) >= THRESHOLDS.half else found.refitted
 
     # Pairs
 

@@ -14,7 +14,7 @@ from ...plant import Reconstruction, Swing
 from ...records import Record
 from ...structures import AttachedOscillator, Cause, DelayedForce, ForceDelay, Maxwell, Structure
 from ..channels.clock import WAYS, in_its_time
-from ..channels.drift import plainly_wandering, steadied
+from ..channels.drift import PLAINLY, steadied, wandering
 from ..evidence.between_records import differ
 from ..evidence.excess import white
 from ..evidence.fitted import Trial
@@ -120,7 +120,7 @@ class Study:
             if not self._lags(late, problem, given, refitted):
                 return late
             return self._sought(problem._replace(ways=()), given, refitted, known)
-        channel = plainly_wandering(refitted, problem)
+        channel = wandering(refitted, problem, PLAINLY)
         if channel is not None:
             return self._sought_with(problem.with_wandering(channel), problem, given, refitted, known)
         problem, missing = self._moving(problem)
