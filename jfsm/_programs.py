@@ -4,6 +4,7 @@ JAX does the keeping; here it is said where, from what time of compilation on, a
 """
 
 import functools
+import itertools
 import os
 import threading
 from collections.abc import Iterator
@@ -17,6 +18,8 @@ _WORTH_KEEPING = 0.2
 _MOST = 500_000_000
 """Bytes in the user's cache folder from which the programs that were not used for longest go. JAX's own bound,
 `jax_compilation_cache_max_size`, needs a package that JAX does not bring, and fails on programs kept without it."""
+TRACED = "-traced"
+"""Ending of the files of traced programs; those of compiled ones are JAX's."""
 _UNCHOSEN = {"jax_compilation_cache_dir": None, "jax_persistent_cache_min_compile_time_secs": 1.0}
 """What JAX's settings are where nobody chose."""
 
@@ -42,9 +45,14 @@ def settings() -> dict[str, str | float]:
     return {"jax_compilation_cache_dir": str(folder), "jax_persistent_cache_min_compile_time_secs": _WORTH_KEEPING}
 
 
+def _kept(folder: Path) -> Iterator[Path]:
+    """Files of programs."""
+    return itertools.chain(folder.glob("*-cache"), folder.glob("*" + TRACED))
+
+
 def make_room(folder: Path, most: int = _MOST) -> None:
     """Delete files of a folder, beginning with those not used for longest, until it holds no more than `most` bytes."""
-    files = [(max(f.stat().st_atime_ns, f.stat().st_mtime_ns), f.stat().st_size, f) for f in folder.glob("*-cache")]
+    files = [(max(f.stat().st_atime_ns, f.stat().st_mtime_ns), f.stat().st_size, f) for f in _kept(folder)]
     size = sum(bytes_ for _, bytes_, _ in files)
     for _, bytes_, path in sorted(files):
         if size <= most:

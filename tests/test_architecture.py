@@ -19,6 +19,7 @@ ROOMS = (
     "_limit",
     "_threads",
     "_programs",
+    "_traced",
     "_map_reader",
     "reporting",
     "records",

@@ -26,6 +26,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
+from .._traced import kept_result
 from .._types import Array
 from ..plant import (
     DelayBuffer,
@@ -115,6 +116,7 @@ class Start(eqx.Module):
     covariance: Float[Array, "state state"]
 
 
+@kept_result
 class Innovations(NamedTuple):
     """Difference between reading and prediction, and its variance, each (n, channels).
 
@@ -136,6 +138,7 @@ def _product(a, b):
     return jnp.stack([jnp.sum(a * b[:, j][None, :], 1) for j in range(b.shape[1])], 1)
 
 
+@kept_result
 class State(NamedTuple):
     """What a filter carries from sample to sample.
 
@@ -157,6 +160,7 @@ class State(NamedTuple):
         return Motion(self.x, self.v, self.z, self.mode.astype(self.x.dtype))
 
 
+@kept_result
 class Passage(NamedTuple):
     """How a lane went through a sample: what was `seen` of it, its motion as predicted and as `read`, and what became
     of a small change.

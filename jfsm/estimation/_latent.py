@@ -21,6 +21,7 @@ import scipy.linalg
 from jaxtyping import ArrayLike, Bool, Float, Shaped
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
+from .._traced import jit_kept
 from .._types import Array
 from ..plant import InterpolatedInput, Observation, Plant, bucket, force_along, shifted, undelayed
 from ._kalman import LinearModel, log_likelihood, smoothed, swell_of
@@ -247,12 +248,12 @@ def _driven(model: _Model, force, values):
     return jnp.einsum("hsd,nhd->ns", model.by_force, force), values - force[:, 0] @ model.through.T
 
 
-@jax.jit
+@jit_kept
 def _likelihoods(models: _Model, force, values, use, swell):
     return jax.vmap(lambda m: log_likelihood(m.linear, *_driven(m, force, values), use, swell))(models)
 
 
-@jax.jit
+@jit_kept
 def _smooth(model: _Model, force, values, use, swell):
     size = model.linear.step.shape[0]
     mean, covariance = smoothed(model.linear, *_driven(model, force, values), use, jnp.eye(size), swell)

@@ -16,7 +16,6 @@ References
 N. K. Gupta, R. K. Mehra, IEEE Trans. Autom. Control 19 (1974) 774, of the sensitivities of a filter.
 """
 
-from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -24,6 +23,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Shaped
 
+from .._traced import jit_kept, kept_result
 from .._types import Array
 from ..estimation._filter import Passage, State, Stretch, few_states, passages, shown
 from ..plant import InterpolatedInput, acceleration, advance_sample, begin, inverse_mass, true_force
@@ -99,6 +99,7 @@ def _along(
     return [np.concatenate([np.asarray(a) for a in each])[:count] for each in zip(*parts, strict=True)]
 
 
+@kept_result
 class _Change(NamedTuple):
     """What the logarithms of the channels' noise variances make of a state's covariance (channels, state, state) and
     of itself (state, channels)."""
@@ -112,14 +113,14 @@ def _no_change(passed: Passage) -> _Change:
     return _Change(jnp.zeros((channels, size, size)), jnp.zeros((size, channels)))
 
 
-@partial(jax.jit, static_argnums=0)
+@jit_kept
 def _passages(static: Any, leaves, numbers, velocity, dt, stretch: Stretch, state: State, first: Bool[Array, ""]):
     """State of a lane after a stretch, and its `Passage` (n, 1, ...); arguments as of a run."""
     plants, assumed, observation, state = lanes_before(static, leaves, numbers, velocity, dt, stretch, state, first)
     return passages(plants, assumed, observation, stretch, dt, state)
 
 
-@partial(jax.jit, static_argnums=0)
+@jit_kept
 def _begin(static: Any, leaves, run, lot, dt, stretch: Stretch) -> Float[Array, "state width"]:
     """Changes of the state at the first sample by each of a lot of unknowns."""
     plant, noise, _ = jax.tree.unflatten(static, leaves)
@@ -138,7 +139,7 @@ def _flat(motion):
     return jnp.concatenate(motion[:3])
 
 
-@partial(jax.jit, static_argnums=0)
+@jit_kept
 def _by_unknowns(static: Any, leaves, run, lot, dt, stretch: Stretch, passed: Passage, begins):
     """Changes (state, width) of the state after a stretch that begins with some, and of the innovations
     (n, channels, width), by each of a lot of unknowns."""
@@ -164,7 +165,7 @@ def _by_unknowns(static: Any, leaves, run, lot, dt, stretch: Stretch, passed: Pa
     return _carried(passed, begins, by_y, jnp.zeros((*by_y.shape[:2], *by_m.shape[1:])), by_m)
 
 
-@partial(jax.jit, static_argnums=0)
+@jit_kept
 def _by_noise(static: Any, leaves, run, use, passed: Passage, begins: _Change):
     """`_Change` after a stretch that begins with one, and what the logarithms of the channels' noise variances make of
     the innovations and of their variances (n, channels, channels)."""

@@ -1,10 +1,10 @@
 """The force that laws exert along a given motion."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from .._traced import jit_kept
 from .._types import Array
 from ._forces import friction_limits, hidden_rate, hidden_start, settle, smooth_force
 from ._grid import delayed_along
@@ -15,7 +15,7 @@ HIDDEN_SUBSTEPS = 4
 """Steps of a hidden state per sample; the motion is straight in between."""
 
 
-@eqx.filter_jit
+@jit_kept
 def force_along(
     plant: Plant,
     x: Float[Array, "n dof"],

@@ -4,11 +4,11 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from .._traced import jit_kept
 from .._types import Array, is_traced
 from ..records import Record, declipped, silent_forces
 from ..structures import Clipping, LinearDamping, LinearStiffness, Structure
@@ -150,7 +150,7 @@ def _fastest_rate(plant: Plant, x: np.ndarray, v: np.ndarray) -> float:
     return float(np.max(np.abs(np.linalg.eigvals(np.asarray(jacobian)))))
 
 
-@eqx.filter_jit
+@jit_kept
 def relaxed_jacobian(plant: Plant, x: State, v: State) -> Float[Array, "state state"]:
     """Derivative of the rate of the state by the state, hidden states relaxed and friction left out."""
     return linearised(plant, inverse_mass(plant), x, v, hidden_start(plant, x, v), jnp.zeros_like(x), jnp.zeros(()))[1]

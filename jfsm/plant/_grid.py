@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from .._traced import jit_kept, kept_result
 from .._types import Array, is_traced
 from ._forces import Scalar, Square, State, hidden_start
 from ._plant import Plant
@@ -105,6 +106,7 @@ def true_force(
     return measured - base[:, None] * inertia[None, :]
 
 
+@kept_result
 class DelayBuffer(NamedTuple):
     """Ring buffer of the displacements and velocities of the last samples, and the number of samples so far.
 
@@ -257,13 +259,13 @@ def begin(plant: Plant, minv: Square, x0: State, v0: State, inputs: Interpolated
     return Motion(x0, v0, z0, mode_at(plant, minv, x0, v0, z0, g, inputs.time[0])), buffer
 
 
-@eqx.filter_jit
+@jit_kept
 def run_grid(plant: Plant, inputs: InterpolatedInput, x0: State, v0: State) -> tuple[Run, Run, Run]:
     """Displacement, velocity and acceleration (relative to the base) at every sample, each (n, dof)."""
     return free_run(plant, inputs, x0, v0)
 
 
-@eqx.filter_jit
+@jit_kept
 def run_strided(
     plant: Plant, inputs: InterpolatedInput, stride: Int[Array, ""], x0: State, v0: State
 ) -> tuple[Run, Run, Run]:

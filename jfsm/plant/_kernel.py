@@ -1,19 +1,16 @@
 """Loops over samples, which XLA's processor runtime would run operation by operation."""
 
-from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from functools import wraps
-from threading import Lock
 from typing import Any, TypeVar
 
 import jax
 import jax.numpy as jnp
 from jax.experimental.xla_metadata import set_xla_metadata
 
-Found = TypeVar("Found")
+from .._traced import jit_kept
 
-_KEPT = 40
-"""Programs of a function that are kept, those used last: one of them takes up to fifty megabytes."""
+Found = TypeVar("Found")
 
 _OPTIONS = {"xla_backend_optimization_level": 1}
 """On a CPU. The further LLVM passes take a quarter of the compile time and make nothing faster."""
@@ -25,21 +22,11 @@ _refused = False
 def jit_with_kernels(function: Callable[..., Found]) -> Callable[..., Found]:
     """`jax.jit` of a function whose keyword `one_kernel` says whether its loops may be kernels.
 
-    The first argument is hashable and part of the program, the others are trees of arrays. Programs that have not been
-    used for long are dropped. The operations that a kernel may hold differ between versions of XLA: after a first
-    refusal there are no more kernels.
+    The first argument is hashable and part of the program, the others are trees of arrays. Traced programs are kept on
+    disk (`jit_kept`). The operations that a kernel may hold differ between versions of XLA: after a first refusal there
+    are no more kernels.
     """
-    programs: OrderedDict[Hashable, Callable[..., Found]] = OrderedDict()
-    lock = Lock()
-
-    def compiled(static: Hashable, *arguments: Any, one_kernel: bool) -> Found:
-        key = static, one_kernel
-        with lock:
-            program = programs.pop(key, None) or _program(function, static, one_kernel)
-            programs[key] = program
-            while len(programs) > _KEPT:
-                programs.popitem(last=False)
-        return program(*arguments)
+    compiled = jit_kept(function, lambda: _OPTIONS if jax.default_backend() == "cpu" else None)
 
     @wraps(function)
     def run(static: Hashable, *arguments: Any) -> Found:
@@ -54,16 +41,6 @@ def jit_with_kernels(function: Callable[..., Found]) -> Callable[..., Found]:
         return compiled(static, *arguments, one_kernel=False)
 
     return run
-
-
-def _program(function: Callable[..., Found], static: Hashable, one_kernel: bool) -> Callable[..., Found]:
-    """The function with its first argument, compiled at its first call."""
-
-    @wraps(function)
-    def program(*arguments):
-        return function(static, *arguments, one_kernel=one_kernel)
-
-    return jax.jit(program, compiler_options=_OPTIONS if jax.default_backend() == "cpu" else None)
 
 
 def as_one_kernel(loop: Callable[..., Found]) -> Callable[..., Found]:

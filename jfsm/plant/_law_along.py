@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from .._traced import jit_kept
 from .._types import Array
 from ..structures import (
     FRICTION_TERMS,
@@ -83,7 +84,7 @@ def _at_once(kind: type[AbstractTerm], numbers: np.ndarray, d: np.ndarray, w: np
     return found[:rows, : d.size]
 
 
-@partial(jax.jit, static_argnums=0)
+@jit_kept
 def _lot_at_once(laws: tuple[type[AbstractTerm], ...], chosen, numbers, d, w, time):
     def one(row):
         slot = Slots(chosen, row[None], jnp.ones((1, 1)), laws)
@@ -92,7 +93,7 @@ def _lot_at_once(laws: tuple[type[AbstractTerm], ...], chosen, numbers, d, w, ti
     return jax.vmap(one)(numbers)
 
 
-@eqx.filter_jit
+@jit_kept
 def _answering_the_past(plant: Plant, numbers, d, w, time):
     def one(row):
         changed = eqx.tree_at(lambda plant: plant.delayed.parameters, plant, row[None])

@@ -3,12 +3,12 @@
 from functools import partial
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from .._traced import jit_kept
 from .._types import as_array
 from ..records import Record
 from ..structures import Structure
@@ -132,7 +132,7 @@ def _descended(known: tuple, state: np.ndarray) -> tuple[float, np.ndarray]:
     return best[:2]
 
 
-@eqx.filter_jit
+@jit_kept
 def _residuals(plant, observation, inputs, y, spread, counted, state):
     dof = plant.dof
 

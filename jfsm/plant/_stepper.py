@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Bool, Float
 
+from .._traced import kept_result
 from .._types import Array
 from ._forces import Hidden, Modes, Scalar, Square, State, friction_limits, hidden_rate, settle, smooth_force
 from ._plant import Plant
@@ -23,6 +24,7 @@ _SHARED = 1e-10
 """Compliance of a sticking link, as a share of that of the masses: links in a loop or in parallel share the load."""
 
 
+@kept_result
 class Motion(NamedTuple):
     """State of a run: displacement, velocity, hidden states, and mode of each friction slot."""
 
