@@ -99,10 +99,12 @@ def values_and_slopes(
     run: Callable[[np.ndarray, np.ndarray], Innovations],
     thetas: Float[np.ndarray, "lanes unknowns"],
     use: Shaped[np.ndarray, "n channels"],
+    jumps: bool = True,
 ) -> list[Slopes]:
     """`Slopes` of each lane at its values (lanes, unknowns), of the readings that `use` (n, channels) counts.
 
     `run` gives the innovations (runs, n, channels) of lanes (runs,), in ascending order, at values (runs, unknowns).
+    Lanes that seem to have jumped are asked the other way round, if they can: those of laws.
     """
     count, size = thetas.shape
     nudges, counts = NUDGE * np.eye(size), use.ravel()
@@ -113,7 +115,7 @@ def values_and_slopes(
     around = thetas[:, None] + np.concatenate([np.zeros((1, size)), nudges])
     found = in_rows(np.repeat(np.arange(count), size + 1), around.reshape(-1, size))
     lanes = [_Differences(Innovations(*(a[k * (size + 1) :][: size + 1] for a in found)), counts) for k in range(count)]
-    back = [(lane, k) for lane, one in enumerate(lanes) for k in np.flatnonzero(one.jumped)]
+    back = [(lane, k) for lane, one in enumerate(lanes) for k in np.flatnonzero(one.jumped) if jumps]
     if back:
         of, which = np.array(back).T
         other = in_rows(of, thetas[of] - nudges[which])
@@ -205,6 +207,13 @@ class Scene:
     readings: Readings
     doubt: Any
     stretches: dict[int, Stretch]
+
+    @property
+    def has_laws(self) -> bool:
+        """Whether anything but linear springs, dashpots and masses acts."""
+        plant = self.plant
+        others = plant.friction, plant.memory, plant.delayed, plant.maps
+        return any(len(part) for part in others) or bool(np.any(plant.smooth.direction))
 
     @cached_property
     def lowered(self) -> tuple[list[Array], Any]:

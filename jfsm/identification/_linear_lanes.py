@@ -30,10 +30,9 @@ _MOST = 64
 
 def is_linear(scene: Scene) -> bool:
     """Whether a record is that of a linear plant which the linear filter follows faster than the other does."""
-    plant = scene.plant
-    others = plant.friction, plant.memory, plant.delayed, plant.maps, plant.channel_delay, plant.force_delay
-    linear = not any(len(part) for part in others) and not np.any(plant.smooth.direction)
-    return linear and isinstance(scene.inputs, InterpolatedInput) and not few_states(plant, scene.readings.zeros)
+    late = scene.plant.channel_delay.size + scene.plant.force_delay.size
+    driven = isinstance(scene.inputs, InterpolatedInput) and not late
+    return driven and not scene.has_laws and not few_states(scene.plant, scene.readings.zeros)
 
 
 def linear_innovations(scene: Scene, runs: Runs, count: int) -> Innovations:

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Shaped
 from scipy.optimize import minimize
 
 from ..estimation._filter import Innovations
-from ..plant import Grid, Imposed, Plant, hidden_width, numbers_of
+from ..plant import Grid, Imposed, Plant, hidden_width, laws_of, numbers_of
 from ..structures import AbstractFriction, ChannelDelay, ForceDelay, Structure
 from ._colour import Colour
 from ._layout import besides_numbers, plant_rows, plant_vector
@@ -205,7 +205,8 @@ class Posterior:
                 velocity = np.repeat(slackened(nuisances, forgiven)[None], len(values), 0)
                 return _filtered(scene, Runs(np.concatenate(numbers), velocity), until)
 
-            yield from zip(alike, values_and_slopes(run, theta[alike][:, mine], use), strict=True)
+            found = values_and_slopes(run, theta[alike][:, mine], use, scene.has_laws)
+            yield from zip(alike, found, strict=True)
 
     def _run(
         self,
@@ -454,9 +455,9 @@ def _doubt(plant: Plant, nuisances: Nuisances) -> np.ndarray:
 
 def _slot_bucket(structure: Structure) -> int:
     """Smooth slots of the program: one for a candidate beside a linear model, then powers of two."""
-    plant = numbers_of(structure)
-    count = len(plant.smooth)
-    if count == 0 and (len(plant.friction) or len(plant.memory) or len(plant.delayed)):
+    laws = laws_of(structure)
+    count = len(laws.smooth)
+    if count == 0 and (laws.friction or laws.memory or laws.delayed):
         return 0  # in a program of its own anyway
     return 1 if count <= 1 else 2 ** math.ceil(math.log2(count))
 

@@ -59,6 +59,7 @@ from ._plant import Plant as Plant
 from ._plant import alone as alone
 from ._plant import direction as direction
 from ._plant import hidden_width as hidden_width
+from ._plant import laws_of as laws_of
 from ._plant import lower as lower
 from ._plant import numbers_of as numbers_of
 from ._plant import observation_of as observation_of

@@ -120,9 +120,9 @@ def substeps_for(structure: Structure, dt: float, size: Size | Swing | None = No
     ValueError
         If the largest number of steps would still be unstable: the result would look like a motion that diverges.
     """
-    plant, zero = numbers_of(structure), np.zeros(structure.dof)
-    linear = [term for term in structure.terms if isinstance(term, LinearStiffness | LinearDamping)]
-    fastest = _fastest_rate(numbers_of(Structure(structure.mass, linear)), zero, zero)
+    plant = numbers_of(structure)
+    into, zero, eye = np.linalg.inv(plant.mass), np.zeros((plant.dof,) * 2), np.eye(plant.dof)
+    fastest = _fastest(np.block([[zero, eye], [-into @ plant.stiffness, -into @ plant.damping]]))
     if fastest * dt / _MOST_SUBSTEPS > _STABLE_ANGLE:
         raise ValueError(
             f"`model` must move slowly enough for the record's steps of {dt:.6g} s; its fastest mode or decay has "
@@ -135,19 +135,14 @@ def substeps_for(structure: Structure, dt: float, size: Size | Swing | None = No
     own = max(own, _KINKED_SUBSTEPS if len(plant.memory) else 1)
     known = isinstance(size, Swing)
     states = probes_along(size, structure) if known else probes(structure.dof, size or Size(0.0, 0.0))
-    rates = ((_fastest_rate(plant, x, v), angle) for x, v, angle in states)
+    rates = ((_fastest(relaxed_jacobian(plant, x, v)), angle) for x, v, angle in states)
     faster = max([1.0, *(rate * dt / angle / own for rate, angle in rates)])
     return min(_MOST_STIFF_SUBSTEPS, own * _FINER ** math.ceil(math.log(faster, _FINER)))
 
 
-def _fastest_rate(plant: Plant, x: np.ndarray, v: np.ndarray) -> float:
-    """Largest eigenvalue [rad/s] of a plant's motion about a state; friction that sticks is left out."""
-    if not len(plant.smooth) + len(plant.memory) + len(plant.maps):
-        into, zero, eye = np.linalg.inv(plant.mass), np.zeros((plant.dof,) * 2), np.eye(plant.dof)
-        rate = np.block([[zero, eye], [-into @ plant.stiffness, -into @ plant.damping]])
-        return float(np.max(np.abs(np.linalg.eigvals(rate))))
-    jacobian = relaxed_jacobian(plant, jnp.asarray(x), jnp.asarray(v))
-    return float(np.max(np.abs(np.linalg.eigvals(np.asarray(jacobian)))))
+def _fastest(rate: Any) -> float:
+    """Largest eigenvalue [rad/s] of how a state changes."""
+    return float(np.max(np.abs(np.linalg.eigvals(np.asarray(rate)))))
 
 
 @jit_kept

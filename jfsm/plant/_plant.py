@@ -236,17 +236,10 @@ def numbers_of(
     dof = structure.dof
     mass = structure.mass if is_traced(structure.mass) else np.asarray(structure.mass)
     matrices: dict[type, Any] = {LinearStiffness: np.zeros((dof, dof)), LinearDamping: np.zeros((dof, dof))}
-    smooth, friction, memory, delayed, maps = [], [], [], [], []
-    for term in structure.terms:
+    laws = laws_of(structure)
+    for term in laws.linear:
         row = direction(term.at, dof)
-        if isinstance(term, LinearStiffness | LinearDamping):
-            matrices[type(term)] = matrices[type(term)] + _number(term.values[0]) * np.outer(row, row)
-        elif isinstance(term, MapTerm):
-            maps.append(MapSlot(term.force_map, jnp.asarray(row)))
-        elif isinstance(term, AbstractFriction):
-            friction.append(term)
-        else:
-            (memory if term.states else smooth if term.delay is None else delayed).append(term)
+        matrices[type(term)] = matrices[type(term)] + _number(term.values[0]) * np.outer(row, row)
     sensed: dict[str, Any] = {name: np.zeros(dof) for name in ("force_gain", "force_offset", "force_delay")}
     sensed |= {name: np.zeros(len(channels)) for name in ("channel_gain", "channel_offset")}
     channel_delay = {}
@@ -276,17 +269,45 @@ def numbers_of(
     }
     return Plant(
         **arrays,
-        smooth=_slots(smooth, SMOOTH_TERMS, max(smooth_slots, len(smooth)), dof, 0.0 if grid is None else grid.ramp),
-        friction=_slots(friction, FRICTION_TERMS, len(friction), dof),
-        memory=_slots(memory, MEMORY_TERMS, len(memory), dof),
-        delayed=_slots(delayed, DELAYED_TERMS, len(delayed), dof),
-        maps=tuple(maps),
-        reach=_REACH if grid is None else grid.reach(delayed),
+        smooth=_slots(laws.smooth, SMOOTH_TERMS, smooth_slots, dof, 0.0 if grid is None else grid.ramp),
+        friction=_slots(laws.friction, FRICTION_TERMS, 0, dof),
+        memory=_slots(laws.memory, MEMORY_TERMS, 0, dof),
+        delayed=_slots(laws.delayed, DELAYED_TERMS, 0, dof),
+        maps=tuple(MapSlot(term.force_map, jnp.asarray(direction(term.at, dof))) for term in laws.maps),
+        reach=_REACH if grid is None else grid.reach(laws.delayed),
         rolled=rolled,
     )
 
 
-def _slots(terms: list, laws: tuple[type, ...], count: int, dof: int, ramp: float = 0.0) -> Slots:
+class Laws(NamedTuple):
+    """Terms of a structure by what a plant has them in."""
+
+    linear: list[Any]
+    smooth: list[Any]
+    friction: list[Any]
+    memory: list[Any]
+    delayed: list[Any]
+    maps: list[Any]
+
+
+def laws_of(structure: Structure) -> Laws:
+    """The terms of a structure, sorted."""
+    laws = Laws([], [], [], [], [], [])
+    for term in structure.terms:
+        if isinstance(term, LinearStiffness | LinearDamping):
+            laws.linear.append(term)
+        elif isinstance(term, MapTerm):
+            laws.maps.append(term)
+        elif isinstance(term, AbstractFriction):
+            laws.friction.append(term)
+        else:
+            (laws.memory if term.states else laws.smooth if term.delay is None else laws.delayed).append(term)
+    return laws
+
+
+def _slots(terms: list, laws: tuple[type, ...], least: int, dof: int, ramp: float = 0.0) -> Slots:
+    """Slots of some terms, at `least` so many."""
+    count = max(least, len(terms))
     laws = laws + tuple(dict.fromkeys(type(term) for term in terms if type(term) not in laws))
     widest = max([LAW_PARAMETERS, *(len(term.values) for term in terms)])
     kind, parameters, directions = np.zeros(count, np.int32), np.zeros((count, widest)), np.zeros((count, dof))
