@@ -43,6 +43,14 @@ class _UnknownError(Exception):
     """A value of which no text says all."""
 
 
+class _Program:
+    """What runs for arguments of a kind, once it is there."""
+
+    def __init__(self):
+        self.lock = Lock()
+        self.call: Callable[..., Any] | None = None
+
+
 def jit_kept(
     function: Callable[..., Found], options: Callable[[], dict[str, Any] | None] = lambda: None
 ) -> Callable[..., Found]:
@@ -51,7 +59,7 @@ def jit_kept(
     The function gives arrays in tuples, or in named ones that `kept_result` knows. `options` are those of the compiler.
     Programs that have not been used for long are dropped from memory.
     """
-    programs: OrderedDict[Any, Callable[..., Found]] = OrderedDict()
+    programs: OrderedDict[Any, _Program] = OrderedDict()
     lock = Lock()
 
     @wraps(function)
@@ -63,17 +71,15 @@ def jit_kept(
         inside = any(isinstance(array, Tracer) for array in arrays)
         key = tree, others, tuple((array.shape, array.dtype) for array in arrays), inside
         with lock:
-            program = programs.get(key)
-            if program is not None:
-                programs.move_to_end(key)
-        if program is None:
-            compiled = jax.jit(_of_arrays(function, tree, others), compiler_options=options())
-            program = compiled if inside else _kept(function, compiled, key, arrays, options())
-            with lock:
-                programs[key] = program
-                while len(programs) > _KEPT:
-                    programs.popitem(last=False)
-        return program(*arrays)
+            program = programs.setdefault(key, _Program())
+            programs.move_to_end(key)
+            while len(programs) > _KEPT:
+                programs.popitem(last=False)
+        with program.lock:  # of threads that ask for the same at once, the first one traces it
+            if program.call is None:
+                compiled = jax.jit(_of_arrays(function, tree, others), compiler_options=options())
+                program.call = compiled if inside else _kept(function, compiled, key, arrays, options())
+        return program.call(*arrays)
 
     return run
 
@@ -118,7 +124,9 @@ def _kept(
         except Exception:  # what cannot be kept is traced once more, and what cannot be traced says so again
             return compiled
         _write(path, found)
-    return jax.jit(export.deserialize(bytearray(found)).call, compiler_options=options)
+    traced = export.deserialize(bytearray(found)).call
+    # Compiled here: a call would be compiled once more for results of an earlier one, which say where they are.
+    return jax.jit(traced, compiler_options=options).lower(*arrays).compile()
 
 
 def _read(path: Path) -> bytes | None:

@@ -1,5 +1,6 @@
 """Traced programs on disk: when one is found again, when it must not be, and that answers are those of the function."""
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import jax
@@ -153,3 +154,11 @@ def test_an_error_of_the_function_is_its_own(folder):
     failing.__module__, failing.__qualname__ = "jfsm.failing", "failing"
     with pytest.raises(ZeroDivisionError, match="of this function"):
         jit_kept(failing)(np.ones(3))
+
+
+def test_threads_that_ask_for_the_same_trace_it_once(folder):
+    function, x = Traced(), np.linspace(0.0, 1.0, 7)
+    with ThreadPoolExecutor(4) as pool:
+        for found in pool.map(lambda x: function.call(x, power=2), [x] * 8):
+            is_right(found, x)
+    assert function.times == 1
