@@ -1,9 +1,11 @@
 """Writers of files of recorders for the tests, after the public descriptions of their formats."""
 
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
+import h5py
 import numpy as np
 
 
@@ -107,3 +109,16 @@ def catman_file(channels: Sequence[CatmanChannel], export: int = 0, version: int
     offset = 6 + len(start("")) + len(places) + len(heads)
     end = str(offset + len(numbers)) if post else " "
     return struct.pack("<hi", version, offset) + start(end) + places + heads + numbers + b"\xa1\x0f\0\0"
+
+
+def write_mat73(path: Path, run: Mapping[str, np.ndarray]) -> None:
+    """A MATLAB 7.3 file with a struct `run` of arrays and a text."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, values in run.items():
+            file[f"run/{name}"] = values[None]
+            file[f"run/{name}"].attrs["MATLAB_class"] = np.bytes_("double")
+        file["run/note"] = np.array([[ord(letter)] for letter in "run 7"], "u2").T
+        file["run/note"].attrs["MATLAB_class"] = np.bytes_("char")
+        file["run"].attrs["MATLAB_class"] = np.bytes_("struct")
+    with path.open("r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file".ljust(116) + bytes(8) + b"\0\2IM")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from jfsm.records.formats.base import ABOUT, AbstractFormat, Contents, Lazy
+from jfsm.records.formats.hdf5_texts import numbers_of, text_of
 
 if TYPE_CHECKING:
     import h5py
@@ -36,6 +37,9 @@ class Hdf5Format(AbstractFormat):
         def visit(name: str, item: Any) -> None:
             if not hasattr(item, "dtype") or item.shape is None:
                 return
+            if not isinstance(name, str):  # what is no text comes as bytes
+                skipped.append(repr(name))
+                return
             if item.external:
                 skipped.append(f"{name} (stored outside the file)")
                 return
@@ -44,8 +48,7 @@ class Hdf5Format(AbstractFormat):
             for column in item.dtype.names or ():
                 if item.dtype[column].kind in NUMERIC:
                     places[f"{name}.{column}"] = name, column
-            unit = word(item.attrs.get("units", item.attrs.get("unit")))
-            if unit:
+            if unit := text_of(item, "units") or text_of(item, "unit"):
                 units[name] = unit
             if item.dtype.kind not in NUMERIC and not item.dtype.names:
                 skipped.append(name)
@@ -55,7 +58,7 @@ class Hdf5Format(AbstractFormat):
 
         with opened(path, f"{path.name} must be an HDF5 file") as file:
             file.visititems(visit)
-            about = json.loads(str(file.attrs[ABOUT])) if ABOUT in file.attrs else {}
+            about = json.loads(text_of(file, ABOUT)) if ABOUT in file.attrs else {}
 
         def array(name: str) -> np.ndarray:
             place, column = places[name]
@@ -103,8 +106,7 @@ class _Packing(NamedTuple):
 def _packing(item: Any) -> _Packing | None:
     """How a dataset is packed, by the attributes of netCDF's conventions; None if it is not."""
     keys = ("scale_factor", "add_offset", "_FillValue", "missing_value")
-    given = {key: np.ravel(item.attrs[key]) for key in keys if key in item.attrs}
-    given = {key: value for key, value in given.items() if value.size and value.dtype.kind in "iuf"}
+    given = {key: value for key in keys if (value := numbers_of(item, key)).size and value.dtype.kind in "iuf"}
     if not given or item.dtype.kind not in "iuf":
         return None
     gaps = [float(gap) for key in keys[2:] for gap in given.get(key, ()) if np.isfinite(gap)]
@@ -114,15 +116,6 @@ def _packing(item: Any) -> _Packing | None:
         float(given[key][0]) if key in given else default for key, default in ((keys[0], 1.0), (keys[1], 0.0))
     )
     return _Packing(scale, offset, tuple(dict.fromkeys(gaps)))
-
-
-def word(attribute: Any) -> str:
-    """The text of an attribute of any type: str, bytes, or an array of one of them."""
-    if isinstance(attribute, np.ndarray) and attribute.size == 1:
-        attribute = attribute.ravel()[0]
-    if isinstance(attribute, bytes):
-        attribute = attribute.decode("utf-8", "replace")
-    return attribute.strip() if isinstance(attribute, str) else ""
 
 
 @contextlib.contextmanager
