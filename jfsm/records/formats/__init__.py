@@ -7,6 +7,7 @@ from jfsm.records.formats.base import AbstractFormat
 from jfsm.records.formats.base import Contents as Contents
 from jfsm.records.formats.c3d import C3dFormat
 from jfsm.records.formats.catman import CatmanFormat
+from jfsm.records.formats.dewesoft import DewesoftFormat
 from jfsm.records.formats.hdf5 import Hdf5Format
 from jfsm.records.formats.imc import ImcFormat
 from jfsm.records.formats.json_columns import JsonFormat
@@ -44,6 +45,7 @@ FORMATS: tuple[AbstractFormat, ...] = (
     C3dFormat(),
     ImcFormat(),
     CatmanFormat(),
+    DewesoftFormat(),
     LvmFormat(),
     JsonFormat(),
     PeerFormat(),
