@@ -26,8 +26,9 @@ _KNOWN: tuple[tuple[bytes, str, str], ...] = (
 
 # Endings of recorders whose files have no mark of their own that is known here, and archives of theirs.
 _ENDINGS: dict[str, tuple[str, str]] = {
+    **dict.fromkeys((".dxz", ".d7z"), ("a packed Dewesoft file", "Export it from DewesoftX as MATLAB or text.")),
     **dict.fromkeys(
-        (".dxd", ".dxz", ".d7d", ".d7z"), ("a Dewesoft file", "Export it from DewesoftX as MATLAB or text.")
+        (".dxd", ".d7d"), ("a Dewesoft file that does not begin as one", "Export it from DewesoftX as MATLAB or text.")
     ),
     **dict.fromkeys((".tdm", ".tdx"), ("a DIAdem file", "Export it from DIAdem as TDMS or text.")),
     **dict.fromkeys((".wfm", ".isf"), ("a file of an oscilloscope", "Save the waveform as csv.")),
