@@ -5,8 +5,11 @@ import re
 import numpy as np
 import pytest
 from recorders import CatmanChannel, ImcChannel, catman_file, imc_file, imc_key
+from typer.testing import CliRunner
 
+from jfsm.cli import app
 from jfsm.records import align, read
+from jfsm.records._listing import listing
 
 N = 100
 T = np.arange(N)
@@ -191,6 +194,17 @@ def test_catman_overflow_is_a_gap(tmp_path):
     over = CatmanChannel("F", np.where(T == 7, -1e6, F))
     with pytest.raises(ValueError, match="must be finite; 1 of 100"):
         read(_catman(tmp_path / "run.bin", over), force="F")
+
+
+def test_a_listing_proposes_neither_gaps_nor_times(tmp_path):
+    hardware = CatmanChannel("A hardware time", 1.6e9 + 0.005 * T, "s")
+    over, path = CatmanChannel("F", np.full(N, -1e6)), CatmanChannel("x", F, "mm")
+    file = _catman(tmp_path / "run.bin", CLOCK, hardware, over, path)
+    kinds = {channel.name: channel.kind for channel in listing(file).channels if channel.kind}
+    assert kinds == {"x": "displacement"}
+    result = CliRunner().invoke(app, ["inspect", str(file), "--report", str(tmp_path / "page.html")])
+    assert result.exit_code == 0 and "gaps" in result.stdout
+    assert ">inf<" not in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
