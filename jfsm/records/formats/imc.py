@@ -9,7 +9,7 @@ import numpy as np
 
 from jfsm.records._units import find_unit
 from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, told_apart
-from jfsm.records.formats.imc_components import Component, components, values_of
+from jfsm.records.formats.imc_components import Component, components, count_of, values_of
 
 EPOCH = np.datetime64("1980-01-01T00:00:00", "ns")  # stands for no date where no seconds are added to it
 EQUIDISTANT, PAIRS = 1, (2, 3)  # kinds of fields: over an even axis, over a component of their own
@@ -52,8 +52,7 @@ class ImcFormat(AbstractFormat):
             late = 0.0 if begins is None or name not in starts else _seconds_between(begins, starts[name])
             if channel.over is not None:
                 return late + channel.factor * np.asarray(values_of(path, channel.over), dtype=np.float64)
-            count = len(values_of(path, channel.component))
-            return late + channel.factor * (channel.first + channel.step * np.arange(count))
+            return late + channel.factor * (channel.first + channel.step * np.arange(count_of(channel.component)))
 
         return Contents(
             Lazy(names, samples),

@@ -106,6 +106,15 @@ def _placed(component: Component, scan: "_Scan", path: Path) -> Component:
     return replace(component, buffer=buffer, start=start)
 
 
+def count_of(component: Component) -> int:
+    """How many numbers a component has."""
+    width, filled = int(component.number[2]), component.buffer.filled - component.skip
+    if not component.gap:
+        return max(filled, 0) // width
+    used = component.together * width
+    return max((filled + component.gap) // (used + component.gap), 0) * component.together
+
+
 def values_of(path: Path, component: Component) -> np.ndarray:
     """The numbers of one component, as the file means them.
 
@@ -118,12 +127,12 @@ def values_of(path: Path, component: Component) -> np.ndarray:
     raw = np.asarray(bytes_at(path, component.start + buffer.offset, buffer.length))
     raw = (np.roll(raw, -buffer.begins_at) if buffer.begins_at else raw)[: buffer.filled]
     order, kind, width = component.number[0], component.number[1], int(component.number[2])
-    row = component.together * width + component.gap
-    if component.gap:
-        rows = (raw.size + row - component.skip - component.together * width) // row  # the last may lack its end
-        whole = np.zeros(max(rows, 0) * row, np.uint8)
+    used = component.together * width
+    if component.gap:  # the last row may lack its end
+        rows = count_of(component) // component.together
+        whole = np.zeros(rows * (used + component.gap), np.uint8)
         whole[: raw.size] = raw[: whole.size]
-        raw = whole.reshape(-1, row)[:, component.skip : component.skip + component.together * width].reshape(-1)
+        raw = whole.reshape(rows, -1)[:, component.skip : component.skip + used].reshape(-1) if rows else raw[:0]
     else:
         raw = raw[component.skip :]
     if raw.size % width:
