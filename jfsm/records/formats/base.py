@@ -138,6 +138,12 @@ def unique_names(names: Iterable[str]) -> list[str]:
     return list(unique)
 
 
+def left_out(names: Sequence[str], shown: int = 6) -> tuple[str, ...]:
+    """The note on what a reader leaves out, each with its reason; none if it reads everything."""
+    more = f" and {len(names) - shown} more" if len(names) > shown else ""
+    return (f"Left out: {', '.join(names[:shown])}{more}.",) if names else ()
+
+
 def told_apart(given: Sequence[str]) -> tuple[list[str], dict[str, tuple[str, ...]]]:
     """Names for columns of which several share one: all of these are numbered, and what each shared name stands for."""
     seen: dict[str, int] = {}

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from jfsm.records._units import find_unit
-from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, told_apart
+from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, left_out, told_apart
 
 VERSIONS = range(5006, 5013)
 STRINGS = 32  # reserved; the first tells where the samples end
@@ -69,13 +69,12 @@ class CatmanFormat(AbstractFormat):
             late = 0.0 if begins is None or name not in begun else float((begun[name] - begins).astype(np.int64)) * 1e-6
             return late + clocks[name].seconds(path)
 
-        notes = [f"Left out: {', '.join(left[:6])}."] if left else []
-        notes += dict.fromkeys(one.note for one in clocks.values() if one.note)
+        notes = (*left_out(left), *dict.fromkeys(one.note for one in clocks.values() if one.note))
         return Contents(
             Lazy(names, lambda name: _values(path, by_name[name])),
             {name: channel.unit for name, channel in by_name.items() if channel.unit},
             clocks=Lazy(clocks, clock),
-            notes=tuple(notes),
+            notes=notes,
             aliases=aliases,
             begins=None if begins is None else begins.astype("datetime64[ns]"),
         )

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, told_apart
+from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, left_out, told_apart
 
 _PACKAGE = "dwdatareader"
 _READER = Path(__file__).with_name("dewesoft_library.py")
@@ -51,14 +51,11 @@ class DewesoftFormat(AbstractFormat):
             return read[name]
 
         begins, doubt = _begins(listed)
-        notes = (
-            [f"Left out: {', '.join(left[:6])}{f' and {len(left) - 6} more' if len(left) > 6 else ''}."] if left else []
-        )
         return Contents(
             Lazy(names, lambda name: both(name)[1]),
             {name: channel["unit"] for name, channel in by_name.items() if channel["unit"]},
             clocks=Lazy(names, lambda name: _clock(both(name)[0], by_name[name]["rate"])),
-            notes=(*notes, *doubt),
+            notes=(*left_out(left), *doubt),
             aliases=aliases,
             begins=begins,
         )

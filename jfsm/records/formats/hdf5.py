@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from jfsm.records.formats.base import ABOUT, AbstractFormat, Contents, Lazy
+from jfsm.records.formats.base import ABOUT, AbstractFormat, Contents, Lazy, left_out
 from jfsm.records.formats.hdf5_texts import numbers_of, text_of
 
 if TYPE_CHECKING:
@@ -37,17 +37,10 @@ class Hdf5Format(AbstractFormat):
         def visit(name: str, item: Any) -> None:
             if not hasattr(item, "dtype") or item.shape is None:
                 return
-            if not isinstance(name, str):  # what is no text comes as bytes
-                skipped.append(repr(name))
+            if not isinstance(name, str) or item.external:  # a name that is no text comes as bytes
+                skipped.append(f"{name} (stored outside the file)" if isinstance(name, str) else repr(name))
                 return
-            if item.external:
-                skipped.append(f"{name} (stored outside the file)")
-                return
-            if item.dtype.kind in NUMERIC:
-                places[name] = name, None
-            for column in item.dtype.names or ():
-                if item.dtype[column].kind in NUMERIC:
-                    places[f"{name}.{column}"] = name, column
+            places.update(_places(name, item))
             if unit := text_of(item, "units") or text_of(item, "unit"):
                 units[name] = unit
             if item.dtype.kind not in NUMERIC and not item.dtype.names:
@@ -68,9 +61,7 @@ class Hdf5Format(AbstractFormat):
                 return packed[place].unpacked(values)
             return values if column is None else values[column]
 
-        if skipped:
-            notes.append(f"Left out: {', '.join(skipped[:6])}.")
-        return Contents(Lazy(places, array), units, about, notes=tuple(notes))
+        return Contents(Lazy(places, array), units, about, notes=(*notes, *left_out(skipped)))
 
     def save(self, path: Path, contents: Contents) -> None:
         import h5py
@@ -80,6 +71,12 @@ class Hdf5Format(AbstractFormat):
             for name, array in contents.arrays.items():
                 file.create_dataset(name, data=array)
                 file[name].attrs["units"] = contents.units.get(name, "1")
+
+
+def _places(name: str, item: Any) -> dict[str, tuple[str, str | None]]:
+    """What a dataset holds of numbers: itself, or the fields of a table; by name the dataset and the field."""
+    fields = {f"{name}.{field}": (name, field) for field in item.dtype.names or () if item.dtype[field].kind in NUMERIC}
+    return {name: (name, None), **fields} if item.dtype.kind in NUMERIC else fields
 
 
 class _Packing(NamedTuple):

@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from jfsm.records._units import find_unit
-from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, told_apart
+from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, left_out, told_apart
 from jfsm.records.formats.imc_components import Component, components, count_of, values_of
 
 EPOCH = np.datetime64("1980-01-01T00:00:00", "ns")  # stands for no date where no seconds are added to it
@@ -146,8 +146,7 @@ def _seconds_between(one: np.datetime64, other: np.datetime64) -> float:
 
 
 def _notes(channels: Mapping[str, _Channel], left: list[str], starts: Mapping[str, np.datetime64]) -> Iterator[str]:
-    if left:
-        yield f"Left out: {', '.join(left[:6])}{f' and {len(left) - 6} more' if len(left) > 6 else ''}."
+    yield from left_out(left)
     if len(set(starts.values())) > 1:
         yield "The channels of the file began at different instants; their clocks count from the first of them."
     for name, channel in channels.items():
