@@ -180,10 +180,8 @@ def test_more_frames_than_the_header_can_say_are_read(tmp_path):
     ("name", "content", "words"),
     [
         ("00000012.BIN", b"\xa3\x95\x80\x80\x59FMT\0BBnNZ\0", "is an ArduPilot log.*mavlogdump.py"),
-        ("run.dat", b"|CF,2,1,1;|CK,1,3,1,1;", "is an imc FAMOS file.*Export"),
-        ("run.bin", b"\x94\x13\0\0\x10\0", "is a catman file.*Export it from catman"),
-        ("run.dxd", b"\x01\x02\0\x03\0", "is a Dewesoft file.*Export it from DewesoftX"),
-        ("run.dxz", b"PK\x03\x04\0", "is a Dewesoft file.*Export it from DewesoftX"),
+        ("run.dxd", b"\x01\x02\0\x03\0", "is a Dewesoft file that does not begin as one.*Export it from DewesoftX"),
+        ("run.dxz", b"PK\x03\x04\0", "is a packed Dewesoft file.*Export it from DewesoftX"),
         ("run.tdm", b"PK\x03\x04\0", "is a DIAdem file.*TDMS"),
         ("LOG00001.BFL", b"H Product:Blackbox flight data recorder\n\0", "is a Betaflight log.*blackbox_decode"),
         ("run.wfm", b"\0\x0f:WFM#003", "is a file of an oscilloscope.*csv"),

@@ -76,7 +76,7 @@ def show_listing(found: "Listing", proposal: str) -> None:
             f"{channel.samples}",
             "-" if channel.rate is None else f"{channel.rate:.6g}",
             "-" if channel.duration is None else f"{channel.duration:.6g}",
-            f"{channel.lowest:.4g} to {channel.highest:.4g}",
+            f"{channel.lowest:.4g} to {channel.highest:.4g}" if channel.lowest <= channel.highest else "gaps alone",
         )
         for channel in found.channels
     ]

@@ -147,7 +147,7 @@ def _listed(contents: Contents, name: str, array: str, samples: np.ndarray, seco
         name=name,
         number=next((place for place, other in enumerate(contents.arrays, start=1) if other == name), None),
         unit=unit,
-        kind=contents.kinds.get(array) or _kind(array, unit),
+        kind=(contents.kinds.get(array) or _kind(array, unit)) if finite.size else "",
         samples=samples.size,
         lowest=float(np.min(finite, initial=np.inf)),
         highest=float(np.max(finite, initial=-np.inf)),
@@ -173,6 +173,9 @@ def _outline(place: NDArray[Any], samples: NDArray[Any]) -> NDArray[np.float64]:
 
 def _kind(name: str, unit: str) -> str:
     """What a channel may be: by its unit; by its name where that says nothing, or says volts."""
+    with contextlib.suppress(ValueError):
+        if find_unit(unit, "time").quantity == "time":
+            return ""
     for kind in _QUANTITIES:
         if _is_of(kind, unit):
             return kind

@@ -1,5 +1,6 @@
 """The page of a file that does not say which of its channels is what: what it holds, and how to go on."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -63,7 +64,7 @@ def _answers(channels: Sequence[Dictionary]) -> Iterable[Answer]:
 
 
 def _plain(value: float | None, digits: int = 6) -> str:
-    return ABSENT if value is None else f"{value:.{digits}g}".replace("-", "−")
+    return ABSENT if value is None or math.isinf(value) else f"{value:.{digits}g}".replace("-", "−")
 
 
 def _table(channels: Sequence[Dictionary]) -> Table:

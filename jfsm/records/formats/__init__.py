@@ -6,7 +6,10 @@ from jfsm.records.formats.arrow import ArrowFormat
 from jfsm.records.formats.base import AbstractFormat
 from jfsm.records.formats.base import Contents as Contents
 from jfsm.records.formats.c3d import C3dFormat
+from jfsm.records.formats.catman import CatmanFormat
+from jfsm.records.formats.dewesoft import DewesoftFormat
 from jfsm.records.formats.hdf5 import Hdf5Format
+from jfsm.records.formats.imc import ImcFormat
 from jfsm.records.formats.json_columns import JsonFormat
 from jfsm.records.formats.lvm import LvmFormat
 from jfsm.records.formats.mat import MatFormat
@@ -40,6 +43,9 @@ FORMATS: tuple[AbstractFormat, ...] = (
     RosFormat(),
     UlogFormat(),
     C3dFormat(),
+    ImcFormat(),
+    CatmanFormat(),
+    DewesoftFormat(),
     LvmFormat(),
     JsonFormat(),
     PeerFormat(),

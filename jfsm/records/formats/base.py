@@ -2,7 +2,7 @@
 
 import abc
 import importlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
@@ -136,6 +136,25 @@ def unique_names(names: Iterable[str]) -> list[str]:
         key = name or f"column {place}"
         unique[key if key not in unique else f"{key} ({place})"] = None
     return list(unique)
+
+
+def left_out(names: Sequence[str], shown: int = 6) -> tuple[str, ...]:
+    """The note on what a reader leaves out, each with its reason; none if it reads everything."""
+    more = f" and {len(names) - shown} more" if len(names) > shown else ""
+    return (f"Left out: {', '.join(names[:shown])}{more}.",) if names else ()
+
+
+def told_apart(given: Sequence[str]) -> tuple[list[str], dict[str, tuple[str, ...]]]:
+    """Names for columns of which several share one: all of these are numbered, and what each shared name stands for."""
+    seen: dict[str, int] = {}
+    numbered = []
+    for name in given:
+        seen[name] = seen.get(name, 0) + 1
+        numbered.append(f"{name} ({seen[name]})" if name and given.count(name) > 1 else name)
+    names, shared = unique_names(numbered), {}
+    for name, text in zip(names, given, strict=True):
+        shared.setdefault(text, []).append(name)
+    return names, {text: tuple(several) for text, several in shared.items() if text and len(several) > 1}
 
 
 _AXES = ("", "X", "Y", "Z", "RX", "RY", "RZ")  # by the number of a direction

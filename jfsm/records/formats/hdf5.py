@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from jfsm.records.formats.base import ABOUT, AbstractFormat, Contents, Lazy
+from jfsm.records.formats.base import ABOUT, AbstractFormat, Contents, Lazy, left_out
+from jfsm.records.formats.hdf5_texts import numbers_of, text_of
 
 if TYPE_CHECKING:
     import h5py
@@ -36,16 +37,11 @@ class Hdf5Format(AbstractFormat):
         def visit(name: str, item: Any) -> None:
             if not hasattr(item, "dtype") or item.shape is None:
                 return
-            if item.external:
-                skipped.append(f"{name} (stored outside the file)")
+            if not isinstance(name, str) or item.external:  # a name that is no text comes as bytes
+                skipped.append(f"{name} (stored outside the file)" if isinstance(name, str) else repr(name))
                 return
-            if item.dtype.kind in NUMERIC:
-                places[name] = name, None
-            for column in item.dtype.names or ():
-                if item.dtype[column].kind in NUMERIC:
-                    places[f"{name}.{column}"] = name, column
-            unit = word(item.attrs.get("units", item.attrs.get("unit")))
-            if unit:
+            places.update(_places(name, item))
+            if unit := text_of(item, "units") or text_of(item, "unit"):
                 units[name] = unit
             if item.dtype.kind not in NUMERIC and not item.dtype.names:
                 skipped.append(name)
@@ -55,7 +51,7 @@ class Hdf5Format(AbstractFormat):
 
         with opened(path, f"{path.name} must be an HDF5 file") as file:
             file.visititems(visit)
-            about = json.loads(str(file.attrs[ABOUT])) if ABOUT in file.attrs else {}
+            about = json.loads(text_of(file, ABOUT)) if ABOUT in file.attrs else {}
 
         def array(name: str) -> np.ndarray:
             place, column = places[name]
@@ -65,9 +61,7 @@ class Hdf5Format(AbstractFormat):
                 return packed[place].unpacked(values)
             return values if column is None else values[column]
 
-        if skipped:
-            notes.append(f"Left out: {', '.join(skipped[:6])}.")
-        return Contents(Lazy(places, array), units, about, notes=tuple(notes))
+        return Contents(Lazy(places, array), units, about, notes=(*notes, *left_out(skipped)))
 
     def save(self, path: Path, contents: Contents) -> None:
         import h5py
@@ -77,6 +71,12 @@ class Hdf5Format(AbstractFormat):
             for name, array in contents.arrays.items():
                 file.create_dataset(name, data=array)
                 file[name].attrs["units"] = contents.units.get(name, "1")
+
+
+def _places(name: str, item: Any) -> dict[str, tuple[str, str | None]]:
+    """What a dataset holds of numbers: itself, or the fields of a table; by name the dataset and the field."""
+    fields = {f"{name}.{field}": (name, field) for field in item.dtype.names or () if item.dtype[field].kind in NUMERIC}
+    return {name: (name, None), **fields} if item.dtype.kind in NUMERIC else fields
 
 
 class _Packing(NamedTuple):
@@ -103,8 +103,7 @@ class _Packing(NamedTuple):
 def _packing(item: Any) -> _Packing | None:
     """How a dataset is packed, by the attributes of netCDF's conventions; None if it is not."""
     keys = ("scale_factor", "add_offset", "_FillValue", "missing_value")
-    given = {key: np.ravel(item.attrs[key]) for key in keys if key in item.attrs}
-    given = {key: value for key, value in given.items() if value.size and value.dtype.kind in "iuf"}
+    given = {key: value for key in keys if (value := numbers_of(item, key)).size and value.dtype.kind in "iuf"}
     if not given or item.dtype.kind not in "iuf":
         return None
     gaps = [float(gap) for key in keys[2:] for gap in given.get(key, ()) if np.isfinite(gap)]
@@ -114,15 +113,6 @@ def _packing(item: Any) -> _Packing | None:
         float(given[key][0]) if key in given else default for key, default in ((keys[0], 1.0), (keys[1], 0.0))
     )
     return _Packing(scale, offset, tuple(dict.fromkeys(gaps)))
-
-
-def word(attribute: Any) -> str:
-    """The text of an attribute of any type: str, bytes, or an array of one of them."""
-    if isinstance(attribute, np.ndarray) and attribute.size == 1:
-        attribute = attribute.ravel()[0]
-    if isinstance(attribute, bytes):
-        attribute = attribute.decode("utf-8", "replace")
-    return attribute.strip() if isinstance(attribute, str) else ""
 
 
 @contextlib.contextmanager

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from jfsm.records.formats.hdf5 import NUMERIC, dataset, opened, word
+from jfsm.records.formats.hdf5 import NUMERIC, dataset, opened
+from jfsm.records.formats.hdf5_texts import text_of
 
 
 class Struct:
@@ -61,7 +62,7 @@ def _inside(group: Any) -> list[str]:
 
 
 def _value(item: Any, path: Path, demand: str) -> Any:
-    kind = word(item.attrs.get("MATLAB_class"))
+    kind = text_of(item, "MATLAB_class")
     if "MATLAB_sparse" in item.attrs:
         return Unread("a sparse matrix")
     if "MATLAB_object_decode" in item.attrs:

@@ -14,24 +14,21 @@ _KNOWN: tuple[tuple[bytes, str, str], ...] = (
     (b"\x89PNG", "a picture", "Export the numbers as text."),
     (b"\xff\xd8\xff", "a picture", "Export the numbers as text."),
     (b"GIF8", "a picture", "Export the numbers as text."),
-    (b"|CF,", "an imc FAMOS file", "Export it from FAMOS as text or MATLAB."),
     (b"\xa3\x95\x80", "an ArduPilot log", "Convert it: `mavlogdump.py --format csv --types IMU FILE > imu.csv`."),
-    (b"\x94\x13", "a catman file", "Export it from catman as text or MATLAB."),
-    (b"\x96\x13", "a catman file", "Export it from catman as text or MATLAB."),
     (b"H Product:Blackbox", "a Betaflight log", "Convert it: `blackbox_decode FILE` writes csv."),
     (b"DIAdem", "a DIAdem file", "Export it from DIAdem as TDMS or text."),
     (b"CDF\x01", "a netCDF 3 file", "Convert it to netCDF 4 (nccopy -k nc4)."),
     (b"CDF\x02", "a netCDF 3 file", "Convert it to netCDF 4 (nccopy -k nc4)."),
     (b"SQLite format 3", "an SQLite database", "Export the table as text."),
     (b"\x80\x04\x95", "a Python pickle, which could run anything", "Save the arrays by numpy.savez."),
-    (b"DIAEHDR", "a Dewesoft file", "Export it as text or MATLAB."),
 )
 
 
 # Endings of recorders whose files have no mark of their own that is known here, and archives of theirs.
 _ENDINGS: dict[str, tuple[str, str]] = {
+    **dict.fromkeys((".dxz", ".d7z"), ("a packed Dewesoft file", "Export it from DewesoftX as MATLAB or text.")),
     **dict.fromkeys(
-        (".dxd", ".dxz", ".d7d", ".d7z"), ("a Dewesoft file", "Export it from DewesoftX as MATLAB or text.")
+        (".dxd", ".d7d"), ("a Dewesoft file that does not begin as one", "Export it from DewesoftX as MATLAB or text.")
     ),
     **dict.fromkeys((".tdm", ".tdx"), ("a DIAdem file", "Export it from DIAdem as TDMS or text.")),
     **dict.fromkeys((".wfm", ".isf"), ("a file of an oscilloscope", "Save the waveform as csv.")),
