@@ -2,6 +2,7 @@
 
 import itertools
 from dataclasses import replace
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -10,11 +11,13 @@ import pytest
 
 import jfsm
 from jfsm.diagnosis.evidence.setup import Problem
+from jfsm.estimation._filter import Innovations
 from jfsm.identification import (
     Hypothesis,
     Nuisances,
     Posterior,
     _likelihood,
+    _posterior,
     beginnings,
     effect_unknown,
     interval,
@@ -420,3 +423,26 @@ def test_starts_of_a_law_that_sticks_begin_together_as_each_begins_alone():
     alone = [[float(p.values(p.initial(), slack)[0]) for p in posteriors] for slack in (0.1, 0.01)]
     np.testing.assert_allclose(beginnings(posteriors, (0.1, 0.01)), alone, rtol=1e-12)
     assert len(np.unique(alone)) == 6
+
+
+def test_lanes_are_asked_the_other_way_round_only_where_laws_may_jump(smooth, friction, chain_nuisances, monkeypatch):
+    """The first reading alone shows the first unknown, as where a lane has jumped."""
+    asked = []
+
+    def run(lanes, values):
+        asked.append(len(values))
+        error: Any = np.zeros((len(values), 40, 1))
+        error[:, 0, 0] = values[:, 0]
+        return Innovations(error, 1.0 + 0 * error, 0 * error)
+
+    for jumps in (False, True):
+        [found] = _likelihood.values_and_slopes(run, np.zeros((1, 1)), np.ones((40, 1)), jumps)
+        assert found.by_error[0, 0] == pytest.approx(1.0)
+    assert asked == [2, 2, 1]
+    told = []
+    monkeypatch.setattr(_posterior, "values_and_slopes", lambda *given: told.append(given[-1]) or 1 / 0)
+    linear = Posterior(hypothesis(MODEL, None, chain_nuisances), [chain_nuisances])
+    for posterior in (linear, smooth, friction):
+        with pytest.raises(ZeroDivisionError):
+            posterior.evaluate(posterior.initial())
+    assert told == [False, True, True]
