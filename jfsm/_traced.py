@@ -32,6 +32,7 @@ Named = TypeVar("Named", bound=tuple)
 
 _KEPT = 40
 """Programs of a function that stay in memory, those used last: one of them takes up to fifty megabytes."""
+_SOURCE = Path(__file__).parent
 _ARRAY = "array"
 """Stands for an array among arguments."""
 _LIBRARIES = "jax", "jaxlib", "equinox", "lineax", "optimistix"
@@ -151,8 +152,10 @@ def _write(path: Path, found: bytes) -> None:
 @cache
 def _versions() -> str:
     """Of the libraries that trace, and of the source of jfsm."""
-    source = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
+    paths, source = sorted(_SOURCE.rglob("*.py")), hashlib.sha256()
+    if not paths:
+        raise _UnknownError  # an archive, say
+    for path in paths:
         source.update(path.read_bytes())
     return " ".join([source.hexdigest(), *map(version, _LIBRARIES)])
 

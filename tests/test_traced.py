@@ -106,8 +106,34 @@ def test_a_damaged_file_is_traced_again_and_mended(folder, damage):
 def test_what_is_not_of_this_package_is_not_kept(folder):
     x = np.linspace(0.0, 1.0, 7)
     is_right(Traced(ours=False).call(x, power=2), x)
-    Traced().call(x, power=2, nothing=np.sum.__get__)  # says nothing of itself that lasts
+    for nothing in (np.sum.__get__, Traced):  # neither says all of itself by a name
+        Traced().call(x, power=2, nothing=nothing)
     assert not files(folder)
+
+
+def test_what_is_made_inside_a_function_is_not_kept(folder):
+    def made(scale):
+        def local(x):
+            return scale * x
+
+        local.__module__ = "jfsm.made"
+        return local
+
+    def applied(function, x):
+        return function(x)
+
+    applied.__module__, applied.__qualname__ = "jfsm.made", "applied"
+    for scale in (2.0, 3.0):
+        assert jit_kept(applied)(made(scale), np.ones(3)) == pytest.approx(scale * np.ones(3))
+    assert not files(folder)
+
+
+def test_nothing_is_kept_where_the_source_cannot_be_read(folder, monkeypatch):
+    monkeypatch.setattr(_traced, "_SOURCE", folder / "nowhere")
+    _traced._versions.cache_clear()
+    is_right(Traced().call(np.ones(3), power=2), np.ones(3))
+    assert not files(folder)
+    _traced._versions.cache_clear()
 
 
 def test_laws_of_the_user_are_not_kept_and_those_of_the_library_are(folder):
