@@ -71,9 +71,10 @@ def jit_kept(
         others = tuple(_ARRAY if array else (type(leaf), leaf) for leaf, array in zip(leaves, is_array, strict=True))
         inside = any(isinstance(array, Tracer) for array in arrays)
         key = tree, others, tuple((array.shape, array.dtype) for array in arrays), inside
+        there = key, jax.config.values["jax_default_device"], frozenset[Any]() if inside else _devices(arrays)
         with lock:
-            program = programs.setdefault(key, _Program())
-            programs.move_to_end(key)
+            program = programs.setdefault(there, _Program())
+            programs.move_to_end(there)
             while len(programs) > _KEPT:
                 programs.popitem(last=False)
         with program.lock:  # of threads that ask for the same at once, the first one traces it
@@ -83,6 +84,13 @@ def jit_kept(
         return program.call(*arrays)
 
     return run
+
+
+def _devices(arrays: list[Any]) -> frozenset[Any]:
+    """Where arrays are, if they can be in several places; those of NumPy are nowhere yet."""
+    if len(jax.devices()) == 1:
+        return frozenset()
+    return frozenset(device for array in arrays if isinstance(array, jax.Array) for device in array.devices())
 
 
 def _of_arrays(function: Callable[..., Found], tree: Any, others: tuple[Any, ...]) -> Callable[..., Found]:

@@ -1,5 +1,8 @@
 """Traced programs on disk: when one is found again, when it must not be, and that answers are those of the function."""
 
+import os
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
@@ -188,3 +191,31 @@ def test_threads_that_ask_for_the_same_trace_it_once(folder):
         for found in pool.map(lambda x: function.call(x, power=2), [x] * 8):
             is_right(found, x)
     assert function.times == 1
+
+
+ON_TWO_DEVICES = """
+import jax, numpy as np
+jax.config.update("jax_enable_x64", True)
+from jfsm._traced import jit_kept
+
+def twice(x):
+    return 2 * x
+
+twice.__module__ = "jfsm.twice"
+call = jit_kept(twice)
+first, second = jax.devices()
+for device in (first, second, first):
+    assert call(jax.device_put(np.ones(3), device)).devices() == {device}
+with jax.default_device(second):
+    assert call(np.ones(3)).devices() == {second}
+print("right")
+"""
+
+
+def test_each_device_has_its_own(tmp_path):
+    settings = {"XLA_FLAGS": "--xla_force_host_platform_device_count=2", "JAX_COMPILATION_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", ON_TWO_DEVICES], capture_output=True, text=True, check=False, env=os.environ | settings
+    )
+    assert done.stdout.strip() == "right", done.stderr
+    assert len(files(tmp_path)) == 1
