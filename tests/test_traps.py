@@ -342,7 +342,7 @@ def test_14_units_of_recorders_are_known(tmp_path, head, factor):
     ("name", "content", "message"),
     [
         ("a.dat", b"MDF     3.30    " + bytes(100), "asammdf|MDF file"),
-        ("a.dat", b"|CF,2,1,1;|CK,1,3,1,1;" + bytes(50), "is an imc FAMOS file, which is not read"),
+        ("a.dat", b"|CF,2,1,1;|CK,1,3,1,1;" + bytes(50), "Export what you need from FAMOS"),
         (
             "a.tdm",
             b"PK\x03\x04" + bytes(26) + b"data.tdx" + bytes(50),
