@@ -15,7 +15,6 @@ from contextlib import suppress
 from functools import cache, wraps
 from importlib.metadata import version
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from threading import Lock
 from types import FunctionType
 from typing import Any, TypeVar
@@ -25,6 +24,7 @@ import numpy as np
 from jax import export
 from jax.core import Tracer
 
+from ._files import write_atomically
 from ._programs import TRACED
 
 Found = TypeVar("Found")
@@ -79,8 +79,9 @@ def jit_kept(
                 programs.popitem(last=False)
         with program.lock:  # of threads that ask for the same at once, the first one traces it
             if program.call is None:
-                compiled = jax.jit(_of_arrays(function, tree, others), compiler_options=options())
-                program.call = compiled if inside else _kept(function, compiled, key, arrays, options())
+                chosen = options()
+                compiled = jax.jit(_of_arrays(function, tree, others), compiler_options=chosen)
+                program.call = compiled if inside else _kept(function, compiled, key, arrays, chosen)
         return program.call(*arrays)
 
     return run
@@ -149,12 +150,10 @@ def _read(path: Path) -> bytes | None:
 
 
 def _write(path: Path, found: bytes) -> None:
-    """Write a file at once, or not at all."""
+    """Write a file, where it can be written."""
     with suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        with NamedTemporaryFile(dir=path.parent, delete=False) as file:
-            file.write(hashlib.sha256(found).digest() + found)
-        Path(file.name).replace(path)
+        write_atomically({path: hashlib.sha256(found).digest() + found})
 
 
 @cache

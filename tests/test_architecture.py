@@ -18,6 +18,7 @@ ROOMS = (
     "_format",
     "_limit",
     "_threads",
+    "_files",
     "_programs",
     "_traced",
     "_map_reader",

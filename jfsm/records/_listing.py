@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jfsm.records._sources import opened
-from jfsm.records._units import KINDS, find_unit
+from jfsm.records._units import KINDS, find_unit, seconds_in
 from jfsm.records.formats.base import Contents
 from jfsm.records.formats.clocks import clock_of
 from jfsm.records.formats.lookup import Choice, own_names
@@ -173,9 +173,8 @@ def _outline(place: NDArray[Any], samples: NDArray[Any]) -> NDArray[np.float64]:
 
 def _kind(name: str, unit: str) -> str:
     """What a channel may be: by its unit; by its name where that says nothing, or says volts."""
-    with contextlib.suppress(ValueError):
-        if find_unit(unit, "time").quantity == "time":
-            return ""
+    if seconds_in(unit) is not None:
+        return ""
     for kind in _QUANTITIES:
         if _is_of(kind, unit):
             return kind

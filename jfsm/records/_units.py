@@ -100,6 +100,15 @@ def find_unit(text: str, kind: str) -> Unit:
     return unit
 
 
+def seconds_in(unit: str) -> float | None:
+    """Seconds in a unit of time; None of what is none."""
+    try:
+        found = find_unit(unit, "time")
+    except ValueError:
+        return None
+    return found.factor if found.quantity == "time" else None
+
+
 class Sensitivity(NamedTuple):
     """A sensor's reading for one unit of what it measures: value in `unit` = value as written / `size`.
 

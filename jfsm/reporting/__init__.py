@@ -1,8 +1,8 @@
 """What is shown: terminal text, pictures and pages, from plain dictionaries such as ``Diagnosis.to_json`` writes."""
 
+from .._files import write_atomically as write_atomically
+from .._files import write_text_atomically as write_text_atomically
 from ._checks import stopping_line as stopping_line
-from ._files import write_atomically as write_atomically
-from ._files import write_text_atomically as write_text_atomically
 from ._force_map_page import force_map_pictures as force_map_pictures
 from ._force_map_page import print_force_map as print_force_map
 from ._force_map_page import render_force_map as render_force_map

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from jfsm.records._units import find_unit
+from jfsm.records._units import seconds_in
 from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, left_out, told_apart
 
 VERSIONS = range(5006, 5013)
@@ -247,10 +247,4 @@ def _agrees(path: Path, even: _Clock, column: _Channel) -> bool:
 
 def _seconds(channel: _Channel) -> float:
     """Seconds in the unit of a channel that holds the times of others; 0 of any other."""
-    if not _TIME.match(channel.name):
-        return 0.0
-    try:
-        unit = find_unit(channel.unit, "time")
-    except ValueError:
-        return 0.0
-    return unit.factor if unit.quantity == "time" else 0.0
+    return (seconds_in(channel.unit) or 0.0) if _TIME.match(channel.name) else 0.0

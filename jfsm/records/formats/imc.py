@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from jfsm.records._units import find_unit
+from jfsm.records._units import seconds_in
 from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, left_out, told_apart
 from jfsm.records.formats.imc_components import Component, components, count_of, values_of
 
@@ -102,7 +102,7 @@ def _even(component: Component) -> _Channel:
     reason = component.unreadable or axis.unreadable
     if reason:
         return _Channel(name, component, reason)
-    factor = _seconds(axis.unit)
+    factor = seconds_in(axis.unit)
     if factor is None and axis.unit:
         return _Channel(name, component, f"over {axis.unit}, not over time")
     if factor is None or not axis.step > 0:
@@ -114,7 +114,7 @@ def _even(component: Component) -> _Channel:
 def _paired(members: list[Component]) -> Iterator[_Channel]:
     """Channels over one component: it is their clock where it is in a unit of time, else a channel beside them."""
     over = [member for member in members if member.part == 2]
-    factor = _seconds(over[0].unit) if len(over) == 1 else None
+    factor = seconds_in(over[0].unit) if len(over) == 1 else None
     for member in members:
         if member.part == 2 and factor is not None:
             continue
@@ -131,14 +131,6 @@ def _begins(component: Component) -> np.datetime64 | None:
     if component.triggered is None or (component.triggered == EPOCH and component.buffer.added == 0):
         return None
     return component.triggered + np.timedelta64(round(component.buffer.added * 1e9), "ns")
-
-
-def _seconds(unit: str) -> float | None:
-    try:
-        found = find_unit(unit, "time")
-    except ValueError:
-        return None
-    return found.factor if found.quantity == "time" else None
 
 
 def _seconds_between(one: np.datetime64, other: np.datetime64) -> float:
