@@ -32,6 +32,8 @@ Named = TypeVar("Named", bound=tuple)
 
 _KEPT = 40
 """Programs of a function that stay in memory, those used last: one of them takes up to fifty megabytes."""
+_in_memory: list[OrderedDict[Any, "_Program"]] = []
+"""The programs of each function."""
 _SOURCE = Path(__file__).parent
 _ARRAY = "array"
 """Stands for an array among arguments."""
@@ -61,6 +63,7 @@ def jit_kept(
     Programs that have not been used for long are dropped from memory.
     """
     programs: OrderedDict[Any, _Program] = OrderedDict()
+    _in_memory.append(programs)
     lock = Lock()
 
     @wraps(function)
@@ -85,6 +88,12 @@ def jit_kept(
         return program.call(*arrays)
 
     return run
+
+
+def clear_programs() -> None:
+    """Drop the programs of all functions from memory, as `jax.clear_caches` drops those that JAX keeps."""
+    for programs in _in_memory:
+        programs.clear()
 
 
 def _devices(arrays: list[Any]) -> frozenset[Any]:

@@ -12,6 +12,7 @@ from jaxtyping import Array, Key, install_import_hook
 install_import_hook(CHECKED, "checker.checked")  # before the first module of jfsm is imported
 
 from jfsm._programs import make_room  # noqa: E402
+from jfsm._traced import clear_programs  # noqa: E402
 
 MOST_MAPS = 25_000
 MOST_KEPT = 2_000_000_000
@@ -40,6 +41,7 @@ def programs() -> Iterator[None]:
     yield
     maps = Path("/proc/self/maps")
     if maps.exists() and maps.read_bytes().count(b"\n") > MOST_MAPS:
+        clear_programs()
         jax.clear_caches()
 
 

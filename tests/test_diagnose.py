@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jfsm
+from jfsm import _traced
 from jfsm._format import FORMAT
 from jfsm.diagnosis import _diagnose
 from jfsm.diagnosis.evidence import measured
@@ -381,9 +382,10 @@ def test_a_law_that_is_not_looked_for_gets_no_name_and_a_map_that_runs():
 
 def test_laws_of_a_class_share_one_program(believed, monkeypatch):
     traced = []
+    monkeypatch.setattr(_traced, "_read", lambda path: None)  # none is there from an earlier run
     original = _likelihood.tail_of
     monkeypatch.setattr(_likelihood, "tail_of", lambda *a: traced.append(1) or original(*a))
-    jax.clear_caches()
+    _traced.clear_programs()
     jfsm.diagnose(made(duffing), believed, causes=FEW, key=jax.random.key(0))
     assert traced
     jfsm.diagnose(made(duffing, samples=899, seed=5), believed, causes=FEW, key=jax.random.key(0))

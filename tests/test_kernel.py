@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jfsm import _traced
 from jfsm.plant import _kernel, as_one_kernel, jit_with_kernels
 
 MATRIX = np.array([[2.0, 0.3, 0.0], [0.1, 3.0, 0.2], [0.0, 0.5, 2.5]])
@@ -60,7 +61,7 @@ def test_other_errors_are_not_taken_for_a_refusal():
 
 
 def test_programs_are_compiled_once_and_those_not_used_for_long_are_dropped(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(_kernel, "_KEPT", 2)
+    monkeypatch.setattr(_traced, "_KEPT", 2)
     compiled = []
 
     @jit_with_kernels
