@@ -34,6 +34,7 @@ def diagnosed(records: list[jfsm.Record]) -> jfsm.Diagnosis:
     return jfsm.diagnose(records, MODEL, causes=FEW, max_causes=1, key=jax.random.key(0))
 
 
+@pytest.mark.slow
 def test_a_stiffness_that_differs_between_records_is_no_law_that_is_missing():
     d = diagnosed([rig(1, 1.0, 9.0, lambda x, v: 0.0), rig(2, 1.6, 8.6, lambda x, v: 0.0)])
     assert d.verdict == "parameters" and "stiffness_value" in [f.cause for f in d.findings]
@@ -42,12 +43,14 @@ def test_a_stiffness_that_differs_between_records_is_no_law_that_is_missing():
         assert low < truth < high and high - low < 0.01 * value
 
 
+@pytest.mark.slow
 def test_of_a_law_at_two_levels_no_number_differs():
     d = diagnosed([rig(3, 0.6, 9.0, lambda x, v: 0.5 * x**3), rig(4, 1.5, 9.0, lambda x, v: 0.5 * x**3)])
     assert d.verdict == "cause" and d.findings[0].cause == "cubic_hardening" and d.findings[0].probability > 0.9
     assert d.data["between_records"] == {}
 
 
+@pytest.mark.slow
 def test_a_law_that_is_not_the_same_in_all_records_is_open():
     sizes = (0.4, 0.8)
     d = diagnosed([rig(5 + i, 1.0, 9.0, lambda x, v, F=F: F * np.tanh(v / 1e-3)) for i, F in enumerate(sizes)])

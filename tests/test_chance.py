@@ -53,6 +53,7 @@ def test_noise_is_no_excuse_for_a_value_that_is_off(record):
     assert not is_noise_only(drawn)
 
 
+@pytest.mark.slow
 def test_noise_is_no_excuse_for_an_offset_that_is_a_bias(record):
     channels = {kind: y for (kind, _), y in record.channels.items()}
     channels["acceleration"] = channels["acceleration"] + 0.1 * np.std(channels["acceleration"])

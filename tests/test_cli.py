@@ -567,6 +567,7 @@ def test_an_inspection_as_json_gives_its_page(channels, folder, tmp_path):
     assert "displacement 1" in (tmp_path / "page.html").read_text()
 
 
+@pytest.mark.slow
 def test_a_force_is_mapped_printed_shown_and_written(channels, folder, tmp_path):
     out, page = tmp_path / "map.npz", tmp_path / "page.html"
     result = run("map", *channels, "--mass", MASS, "--order", 1, "--out", out, "--report", page)

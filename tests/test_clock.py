@@ -94,8 +94,10 @@ def problem_of(record: jfsm.Record, model: jfsm.Structure) -> Problem:
     return Problem(model, prepare_all([record], model), [N], ways=WAYS)
 
 
-@pytest.mark.parametrize("masses", [1, 2])
-@pytest.mark.parametrize("samples", [0.3, 0.7])
+@pytest.mark.parametrize(
+    ("samples", "masses"),
+    [(0.3, 1), (0.7, 2), pytest.param(0.7, 1, marks=pytest.mark.slow), pytest.param(0.3, 2, marks=pytest.mark.slow)],
+)
 def test_a_force_that_acts_late_is_so_by_the_baseline(samples: float, masses: int):
     problem = problem_of(recorded(late(samples), masses), chain(masses))
     _, refitted = fit_model(problem)
@@ -106,7 +108,10 @@ def test_a_force_that_acts_late_is_so_by_the_baseline(samples: float, masses: in
     assert tau == pytest.approx(-samples * STEP, rel=0.02) and high - low < 0.05 * STEP
 
 
-@pytest.mark.parametrize(("way", "acting"), [("hold", held), ("linear", straight)])
+@pytest.mark.parametrize(
+    ("way", "acting"),
+    [pytest.param("hold", held, marks=pytest.mark.slow), pytest.param("linear", straight, marks=pytest.mark.slow)],
+)
 def test_how_a_force_goes_between_its_samples_is_seen_by_the_baseline(way: str, acting: Callable[[float], float]):
     problem = problem_of(recorded(acting), chain())
     found = in_its_time(fit_model(problem)[1], problem, to_noise=True)
@@ -123,6 +128,7 @@ def test_a_force_in_time_stays_as_it_was_recorded():
     assert change_by_times(given.structure, problem.first, "band-limited") == 0.0
 
 
+@pytest.mark.slow
 def test_a_late_force_beside_a_law_has_to_be_likelier_than_all_that_is_known():
     problem = problem_of(recorded(held), chain())
     _, refitted = fit_model(problem)
@@ -131,6 +137,7 @@ def test_a_late_force_beside_a_law_has_to_be_likelier_than_all_that_is_known():
     assert in_its_time(refitted, problem, to_noise=True, likeliest=refitted.evidence + 1e6) is None
 
 
+@pytest.mark.slow
 def test_a_way_of_the_force_in_which_a_law_runs_away_promises_nothing(monkeypatch):
     problem = problem_of(recorded(held), chain())
     _, refitted = fit_model(problem)
@@ -145,6 +152,7 @@ def test_a_single_line_shows_no_late_force():
     assert in_its_time(fit_model(problem)[1], problem, to_noise=False) is None
 
 
+@pytest.mark.slow
 def test_a_response_that_is_late_among_others_is_not_the_force():
     record = recorded(late(0.0), kinds=("displacement", "acceleration"))
     earlier = np.asarray(recorded(late(0.5)).displacement)[:, 0]  # that of half a sample ago, but for the noise
@@ -188,6 +196,7 @@ def test_a_late_force_is_found_where_nothing_else_is_looked_for():
     assert d.verdict == "cause" and [f.cause for f in d.findings] == ["force_delay"]
 
 
+@pytest.mark.slow
 def test_a_force_that_is_hardly_late_is_said_and_no_cause():
     d = jfsm.diagnose(recorded(late(0.02)), chain(), causes=TRIED, key=jax.random.key(0))
     assert d.verdict == "consistent" and not d.findings

@@ -28,7 +28,9 @@ def said(d: jfsm.Diagnosis) -> list[str]:
     return [note for note in d.notes if "remembers" in note]
 
 
-@pytest.mark.parametrize("channels", [("displacement",), ("displacement", "acceleration")])
+@pytest.mark.parametrize(
+    "channels", [("displacement",), pytest.param(("displacement", "acceleration"), marks=pytest.mark.slow)]
+)
 def test_a_spring_is_named_amid_noise_with_a_memory(channels):
     record = remembering(made(duffing, samples=2000, channels=channels))
     d = jfsm.diagnose(record, RIGHT, causes=FEW, key=jax.random.key(0))
@@ -38,6 +40,7 @@ def test_a_spring_is_named_amid_noise_with_a_memory(channels):
     assert d.gain is not None and d.gain.closed > 0.9
 
 
+@pytest.mark.slow
 def test_noise_with_a_memory_is_no_cause_by_itself():
     d = jfsm.diagnose(remembering(made(linear, samples=2000)), RIGHT, causes=FEW, key=jax.random.key(0))
     assert d.verdict == "consistent" and said(d)

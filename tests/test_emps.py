@@ -8,6 +8,7 @@ import jfsm
 CAUSES = ("coulomb", "quadratic_damping", "position_damping", "periodic_disturbance", "force_gain")
 
 
+@pytest.mark.slow
 def test_dry_friction_is_named_on_the_measured_axis(shared_data):
     units, drive = {"displacement": "m"}, {"vir": "0.0284490 V/N"}  # the drive's voltage for a newton
     path = shared_data / "emps" / "DATA_EMPS.mat"

@@ -73,6 +73,7 @@ def estimated(motion):
     return jfsm.estimate_force_map(seen(motion, 0.05), MASS, trend="cubic")
 
 
+@pytest.mark.slow
 def test_from_displacement_alone_it_is_better_than_after_the_motion_and_its_error_bars_hold():
     covered, better = [], []
     for seed in range(2):
@@ -87,6 +88,7 @@ def test_from_displacement_alone_it_is_better_than_after_the_motion_and_its_erro
     assert np.mean(covered) > 0.8
 
 
+@pytest.mark.slow
 def test_with_all_channels_its_error_bars_hold_the_truth(estimated, motion):
     maps = [jfsm.estimate_force_map(seen(motion, 0.05, seed=seed), MASS, trend="cubic") for seed in (2, 3)]
     assert np.mean([coverage(one, motion, cubic) for one in (estimated, *maps)]) > 0.8

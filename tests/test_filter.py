@@ -124,7 +124,7 @@ def dense_law() -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize(
     "law",
     [
-        CubicStiffness(3.0, at=(1, 2)),
+        pytest.param(CubicStiffness(3.0, at=(1, 2)), marks=pytest.mark.slow),
         Coulomb(0.3, at=(0, 1)),
         DelayedForce(1.0, 0.05, at=(0, 1)),
         Maxwell(2.0, 0.3, at=(0, 1)),
@@ -317,6 +317,7 @@ def test_a_link_that_is_put_to_rest_too_early_is_no_surprise():
     assert np.min(log_share) > np.log(0.002)
 
 
+@pytest.mark.slow
 def test_what_a_reading_may_be_adds_up_to_certainty():
     """While it slides, where it turns, where it comes to rest, and at rest; with a speed that is known badly."""
     n, noise, x0 = 90, 0.3, 0.43

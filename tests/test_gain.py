@@ -128,6 +128,7 @@ def between_wells(n: int = 6000, rate: float = 20.0) -> jfsm.Record:
     return jfsm.Record(time, drive(time), displacement=path.y[0] + noise)
 
 
+@pytest.mark.slow
 def test_a_run_between_wells_begins_where_the_readings_are_however_many_tell_its_start():
     record = between_wells()[2000:]
     spring, dashpot = jfsm.LinearStiffness(1.0, at=(0, 1)), jfsm.LinearDamping(0.3, at=(0, 1))

@@ -61,7 +61,7 @@ def test_errors_of_kriging_left_out_are_those_of_fits_without_the_reading(trend)
         np.testing.assert_allclose(errors[i], force[i] - without(STATES[i]), rtol=1e-8)
 
 
-@pytest.mark.parametrize("measure", [of_kriging, of_rkpm])
+@pytest.mark.parametrize("measure", [of_kriging, pytest.param(of_rkpm, marks=pytest.mark.slow)])
 def test_leave_one_out_errors_are_twice_differentiable(measure):
     at = POINT if measure is of_kriging else WEIGHING
     value, gradient = jax.jit(measure), jax.jit(jax.grad(measure))

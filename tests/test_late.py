@@ -25,7 +25,7 @@ def late(restoring, channel: str, samples: float) -> jfsm.Record:
     return jfsm.Record(noisy.time, **kinds, at_rest=True)
 
 
-@pytest.mark.parametrize("channel", CHANNELS)
+@pytest.mark.parametrize("channel", [pytest.param(CHANNELS[0], marks=pytest.mark.slow), CHANNELS[1]])
 def test_a_channel_that_is_slightly_late_is_no_cause(channel):
     d = jfsm.diagnose(late(linear, channel, 0.5), RIGHT, causes=TRIED, key=jax.random.key(0))
     assert d.verdict == "consistent" and not d.findings

@@ -39,7 +39,7 @@ def reference(eps: float) -> tuple[float, float]:
     return run(amplitude)[0], amplitude
 
 
-@pytest.mark.parametrize("eps", [10.0, 0.3])
+@pytest.mark.parametrize("eps", [pytest.param(10.0, marks=pytest.mark.slow), 0.3])
 def test_a_van_der_pol_oscillator_has_one_stable_cycle_with_the_period_and_amplitude_of_scipy(eps):
     (cycle,) = limit_cycles(van_der_pol(eps))
     period, amplitude = reference(eps)

@@ -51,7 +51,9 @@ def within(cut, axis: str, truth) -> float:
     return float(np.mean(np.abs(force - truth(np.array(cut[axis])))[there] <= half[there]))
 
 
-@pytest.mark.parametrize("method", ["rkpm", "kriging", "joint"])
+@pytest.mark.parametrize(
+    "method", [pytest.param("rkpm", marks=pytest.mark.slow), "kriging", pytest.param("joint", marks=pytest.mark.slow)]
+)
 def test_all_of_the_force_is_mapped_with_an_honest_band(record, method):
     found = jfsm.map_force(record, mass=1.0, method=method)
     cuts = found.data["curves"]["cuts"]
@@ -81,6 +83,7 @@ def test_what_a_model_lacks_is_mapped_and_mends_the_model(record):
     assert np.std(response.displacement - record.displacement) < 0.05 * np.std(before)
 
 
+@pytest.mark.slow
 def test_a_jump_is_found_and_not_smoothed():
     record = measured(jfsm.Structure.sdof(1.0, 9.0, 0.3) + jfsm.Coulomb(1.5, at=(0, 1)))
     found = jfsm.map_force(record, mass=1.0)
@@ -92,6 +95,7 @@ def test_a_jump_is_found_and_not_smoothed():
     assert any("on either side of a jump are left out" in note for note in found.notes)
 
 
+@pytest.mark.slow
 def test_one_link_of_several_is_mapped_by_its_own_motion():
     chain = jfsm.Structure.chain([1.0, 1.0], [12.0, 24.0], [0.4, 0.3])
     record = measured(chain + jfsm.CubicStiffness(30.0, at=(1, 2)))
@@ -115,6 +119,7 @@ def test_readings_that_share_their_errors_count_as_fewer():
     assert _widening(flat, states, states[:, 0] + means) == pytest.approx(math.sqrt(10.0), rel=0.2)
 
 
+@pytest.mark.slow
 def test_a_record_of_one_orbit_is_told_to_say_little_of_the_plane():
     wave = 2.0 * math.pi * 0.5 * TIME[:500]
     found = jfsm.map_force(jfsm.Record(TIME[:500], force=np.sin(wave), displacement=np.sin(wave - 1.0)), mass=1.0)

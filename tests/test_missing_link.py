@@ -37,7 +37,7 @@ def record(spring: float, dashpot: float, springs: list[float] = SPRINGS) -> jfs
 
 @pytest.mark.parametrize(
     ("spring", "dashpot", "cause", "name"),
-    [(150.0, 0.0, "missing_stiffness", "k"), (0.0, 12.0, "missing_damping", "c")],
+    [pytest.param(150.0, 0.0, "missing_stiffness", "k", marks=pytest.mark.slow), (0.0, 12.0, "missing_damping", "c")],
 )
 def test_a_link_that_the_model_lacks_is_named_where_it_is(spring: float, dashpot: float, cause: str, name: str):
     model = jfsm.Structure.chain(MASS, SPRINGS, DASHPOTS)

@@ -47,8 +47,8 @@ def hardening():
     ("kinds", "largest"),
     [
         (("displacement", "velocity", "acceleration"), (0.003, 0.003, 0.008)),
-        (("displacement",), (0.006, 0.015, 0.055)),
-        (("velocity",), (0.018, 0.007, 0.025)),
+        pytest.param(("displacement",), (0.006, 0.015, 0.055), marks=pytest.mark.slow),
+        pytest.param(("velocity",), (0.018, 0.007, 0.025), marks=pytest.mark.slow),
         (("acceleration",), (0.07, 0.011, 0.009)),
     ],
 )
@@ -66,7 +66,7 @@ def test_what_was_not_measured_is_found_from_what_was(hardening, kinds, largest)
         assert found.noise[kind][0] == pytest.approx(0.01 * np.std(hardening[names.index(kind)]), rel=0.2)
 
 
-@pytest.mark.parametrize(("kind", "times"), [("velocity", 1), ("acceleration", 2)])
+@pytest.mark.parametrize(("kind", "times"), [pytest.param("velocity", 1, marks=pytest.mark.slow), ("acceleration", 2)])
 def test_a_displacement_that_no_channel_shows_is_said_to_drown_when_its_noise_is_integrated_so_long(
     hardening, kind, times
 ):
@@ -87,7 +87,7 @@ def test_a_bias_of_an_accelerometer_moves_nothing_and_is_told(hardening):
     assert errors(found, hardening)[0] < 0.07
 
 
-@pytest.mark.parametrize(("slow", "kinds"), [("ramp", KINDS[2:]), ("walk", KINDS)])
+@pytest.mark.parametrize(("slow", "kinds"), [("ramp", KINDS[2:]), pytest.param("walk", KINDS, marks=pytest.mark.slow)])
 def test_a_drift_of_an_accelerometer_moves_nothing_and_is_told(hardening, slow, kinds):
     walk = np.cumsum(np.random.default_rng(5).standard_normal(TIME.size))
     drift = {"ramp": np.linspace(-1, 1, TIME.size), "walk": walk - np.mean(walk)}[slow]
@@ -102,6 +102,7 @@ def test_a_drift_of_an_accelerometer_moves_nothing_and_is_told(hardening, slow, 
     assert np.mean(np.abs(miss) < 1.96 * std) > 0.9
 
 
+@pytest.mark.slow
 def test_a_model_tells_the_motion_of_a_mass_that_nothing_measures():
     model = jfsm.Structure.chain(mass=[1.0, 0.7], stiffness=[9.0, 6.0], damping=[0.2, 0.1])
     pushed = np.column_stack([force(TIME), 0 * TIME])
@@ -170,6 +171,7 @@ def test_a_record_that_tells_no_motion_is_refused(hardening):
         jfsm.estimate_motion(jfsm.Record(uneven, displacement=hardening[0, :600]))
 
 
+@pytest.mark.slow
 def test_the_missing_force_is_known_as_well_as_its_error_bar_says(hardening):
     channels = {kind: noisy(y, 0.01, i) for i, (kind, y) in enumerate(zip(KINDS, hardening, strict=True))}
     record = jfsm.Record(TIME, noisy(force(TIME), 0.01, 9), **channels)

@@ -41,6 +41,7 @@ def undecided():
     return jfsm.diagnose(measured(time, force, 1), BELIEVED, causes=RIVALS, key=jax.random.key(0))
 
 
+@pytest.mark.slow
 def test_a_larger_force_tells_a_sine_from_a_cubic_and_does_when_it_is_tried(undecided):
     assert undecided.leading is not None
     first = {t.name: undecided.leading.rivals.index(t) for t in undecided.leading.rivals}
@@ -89,6 +90,7 @@ def test_a_test_in_which_a_rival_might_run_away_is_none(undecided):
     assert _made(leading, Variation(level=level / 1.8), softening, rng)
 
 
+@pytest.mark.slow
 def test_where_no_test_tells_much_the_best_is_proposed_longer_and_tells_more(undecided, monkeypatch):
     monkeypatch.setattr(next_test, "variations", lambda nuisances: [Variation(speed=0.7), Variation(level=1.5)])
     found = undecided.next_tests(key=jax.random.key(3))

@@ -90,6 +90,7 @@ def test_ten_trend_functions_of_two_columns_are_no_quadratic():
 # Section 4
 
 
+@pytest.mark.slow
 def test_the_wells_of_the_negative_oscillator_are_found_and_the_printed_ones_marked():
     outcome = smooth_case("negative_duffing")
     assert_true(outcome, 1e-6)
@@ -169,6 +170,7 @@ def test_case_5_is_true_by_both_readings_of_its_damping():
 # Section 5
 
 
+@pytest.mark.slow
 def test_kriging_under_noise_tells_how_well_it_knows_and_what_was_printed():
     rows = kriging_rows("van_der_pol", 0.05, repetitions=1)
     found = {row.quantity: row for row in rows}

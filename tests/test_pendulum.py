@@ -11,7 +11,10 @@ from benchmarks.rig_records import pendulum_large_angle
 CAUSES = ("sine_stiffness", "cubic_softening", "quadratic_damping", "stiffness_drift")
 
 
-@pytest.mark.parametrize(("inertia", "gravity", "rate", "release"), [(1.0, 9.81, 1.0, 1.3), (3.0, 50.0, 2.0, 0.7)])
+@pytest.mark.parametrize(
+    ("inertia", "gravity", "rate", "release"),
+    [pytest.param(1.0, 9.81, 1.0, 1.3, marks=pytest.mark.slow), (3.0, 50.0, 2.0, 0.7)],
+)
 def test_the_sine_takes_the_place_of_the_linear_spring(inertia: float, gravity: float, rate: float, release: float):
     def motion(t, y):
         return y[1], -(gravity / rate * np.sin(rate * y[0]) + 0.1 * y[1]) / inertia
@@ -30,6 +33,7 @@ def test_the_sine_takes_the_place_of_the_linear_spring(inertia: float, gravity: 
     assert whole == pytest.approx(gravity, rel=0.01) and d.refitted["stiffness@0-1.k"].value < 0.01 * gravity
 
 
+@pytest.mark.slow
 def test_softening_is_said_of_the_measured_pendulum_and_its_law_left_open(shared_data):
     record = pendulum_large_angle(shared_data / "pendulum_large_angle").resample(50.0)
     begin = record.time[0]

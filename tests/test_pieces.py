@@ -40,6 +40,7 @@ def test_a_record_of_few_pieces_or_of_few_periods_is_searched_as_it_is(until: in
     assert pieces([(bursts((5000,)), until)], [period]) is None
 
 
+@pytest.mark.slow
 def test_a_cause_in_a_long_record_is_found_within_the_error_of_all_of_it():
     omega, k3 = 2.0, 0.6
     tones = RNG.uniform(0.5, 4.0, 12), RNG.uniform(0, 2 * np.pi, 12)

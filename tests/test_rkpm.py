@@ -132,7 +132,7 @@ def test_every_monomial_and_its_derivatives_are_reproduced_on_a_trajectory(order
 
 
 @pytest.mark.parametrize("window", WINDOWS, ids=lambda w: type(w).__name__)
-@pytest.mark.parametrize("neighbours", [10, 20, 160])
+@pytest.mark.parametrize("neighbours", [10, pytest.param(20, marks=pytest.mark.slow), 160])
 def test_any_window_and_any_number_of_neighbours_reproduce_a_cubic(window, neighbours):
     states = scattered(500, 2)
     unit = states.std(axis=0)
@@ -246,6 +246,7 @@ def test_the_gradient_is_the_first_derivatives_in_the_order_of_the_columns():
     np.testing.assert_allclose(force_map.gradient(query), stacked, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_map_can_be_differentiated_by_the_width_of_its_window_and_by_the_readings():
     states = scattered(300, 2)
     force, queries = smooth_force(states), scattered(10, 2, seed=13)
@@ -266,7 +267,10 @@ def test_the_map_can_be_differentiated_by_the_width_of_its_window_and_by_the_rea
 # --- one path and the other -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("dim", "outputs"), [(1, 0), (2, 0), (2, 3), (4, 2)])
+@pytest.mark.parametrize(
+    ("dim", "outputs"),
+    [(1, 0), pytest.param(2, 0, marks=pytest.mark.slow), pytest.param(2, 3, marks=pytest.mark.slow), (4, 2)],
+)
 def test_many_states_at_once_give_what_single_calls_give(dim, outputs):
     states = scattered(400, dim)
     columns = all_monomials(states / states.std(axis=0), 4)

@@ -33,7 +33,7 @@ def smooth_force(states):
     ("dim", "order", "across"),
     [
         (1, 3, (Plane((1.0,), 0.2),)),
-        (2, 2, (Plane((1.0, 0.0), 0.0), Plane((0.0, 1.0), 0.1))),
+        pytest.param(2, 2, (Plane((1.0, 0.0), 0.0), Plane((0.0, 1.0), 0.1)), marks=pytest.mark.slow),
         (2, 3, (lambda state: state @ state - 0.4,)),
         (3, 1, (Plane((1.0, -1.0, 0.5), 0.1),)),
     ],

@@ -154,6 +154,7 @@ def tell(what, steps):
     pass
 
 
+@pytest.mark.slow
 def test_a_special_case_that_stopped_on_its_way_is_fitted_from_the_law_that_holds_it(with_friction, fitted):
     every = candidates(MODEL, with_friction.records, chosen_causes(["stribeck", "coulomb"]))
     stribeck, coulomb = (next(c for c in every if c.effects[0].cause.id == name) for name in ("stribeck", "coulomb"))
@@ -274,6 +275,7 @@ def found_beside_friction(records: Any, *parts: Any, cause: str) -> Any:
     )
 
 
+@pytest.mark.slow
 def test_a_single_effect_that_stopped_on_its_way_is_fitted_again_from_the_best_pair_that_has_it(with_friction, fitted):
     given, refitted = fitted
     records = with_friction.records

@@ -91,7 +91,7 @@ def test_a_tighter_tolerance_brings_a_run_closer_to_scipy():
     assert errors[1] < 1e-7 < errors[0]
 
 
-@pytest.mark.parametrize("others", ["linear", "all together"])
+@pytest.mark.parametrize("others", ["linear", pytest.param("all together", marks=pytest.mark.slow)])
 def test_a_run_with_friction_agrees_with_events_located_by_scipy(others):
     model, extra = SMOOTH[others]
     x, v, events = sticking_motion(
@@ -111,7 +111,7 @@ def exact_drive(force, time, substeps: int) -> InterpolatedInput:
     return InterpolatedInput(jnp.asarray(values), jnp.zeros(inner.shape), jnp.asarray(time), jnp.asarray(step))
 
 
-@pytest.mark.parametrize("friction", [0.0, 2.0])
+@pytest.mark.parametrize("friction", [0.0, pytest.param(2.0, marks=pytest.mark.slow)])
 def test_halving_the_steps_divides_the_error_by_sixteen_with_and_without_friction(friction):
     time = 0.15 * np.arange(100)
     model = MODEL + jfsm.Coulomb(friction, at=LINK) if friction else MODEL

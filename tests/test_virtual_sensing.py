@@ -51,6 +51,7 @@ def bands(found, truth, dof):
     return inside, [float(np.std(e) / np.std(z[:, dof - 1])) for e, z in zip(miss, truth, strict=True)]
 
 
+@pytest.mark.slow
 def test_a_load_on_a_mass_that_nothing_measures_is_told_with_the_motion_there():
     truth = x, _, a = chain(**TWO, load=lambda x, v, t: np.array([0.0, np.sign(np.sin(0.7 * t))]))
     channels: dict[str, Any] = {"displacement": {1: noisy(x[:, 0], 1)}, "acceleration": {1: noisy(a[:, 0], 2)}}

@@ -21,7 +21,7 @@ def wandered(record: jfsm.Record, channel: str, share: float) -> jfsm.Record:
     return jfsm.Record(record.time, **kinds, at_rest=True)
 
 
-@pytest.mark.parametrize("channel", ["displacement", "acceleration"])
+@pytest.mark.parametrize("channel", ["displacement", pytest.param("acceleration", marks=pytest.mark.slow)])
 def test_a_spring_is_named_beside_a_zero_that_wanders(channel):
     d = jfsm.diagnose(wandered(made(duffing), channel, 0.3), RIGHT, causes=FEW, key=jax.random.key(0))
     assert [f.cause for f in d.findings] == ["cubic_hardening"] and d.findings[0].probability > 0.9
@@ -42,6 +42,7 @@ def test_what_a_law_makes_slow_is_not_taken_for_a_zero():
     assert [f.cause for f in d.findings] == ["quadratic_stiffness"] and not any("wanders" in note for note in d.notes)
 
 
+@pytest.mark.slow
 def test_a_rest_that_moves_with_the_amplitude_is_not_left_to_a_zero():
     """A sweep through the resonance of a softening spring under a load: its mean goes off and comes back."""
     time = np.arange(2000) * STEP
@@ -63,6 +64,7 @@ def test_a_rest_that_moves_with_the_amplitude_is_not_left_to_a_zero():
     assert d.gain is not None and d.gain.closed > 0.9
 
 
+@pytest.mark.slow
 def test_of_few_periods_what_a_law_makes_is_not_taken_for_a_zero():
     record = made(duffing, samples=200, channels=("displacement",))
     d = jfsm.diagnose(record, RIGHT, causes=FEW, key=jax.random.key(0))
@@ -70,6 +72,7 @@ def test_of_few_periods_what_a_law_makes_is_not_taken_for_a_zero():
     assert [f.cause for f in d.findings] == ["cubic_hardening"]
 
 
+@pytest.mark.slow
 def test_a_creep_of_three_noise_levels_in_a_decay_is_no_cause():
     t = np.arange(2700) * 0.001
     x = 0.02 * np.exp(-3.0 * t) * np.cos(np.sqrt(3000.0 - 9.0) * t) + 3.5e-6 * t

@@ -16,8 +16,8 @@ LAWS = ("cubic_hardening", "cubic_softening", "quadratic_stiffness", "quadratic_
 GAINS = ("force_gain", "accel_gain")
 VALUES = ("stiffness_value", "damping_value", "mass_value")
 
-QUICK = [(12, "coulomb"), (14, "none")]
-SLOW = [(11, "cubic_softening"), (13, "quadratic_damping")]
+QUICK = [(14, "none")]
+SLOW = [(11, "cubic_softening"), (12, "coulomb"), (13, "quadratic_damping")]
 SLOW += [(20 + i, cause) for i, cause in enumerate((*LAWS, *GAINS, *VALUES, "none"))]
 
 

@@ -68,6 +68,7 @@ def test_as_many_seeds_as_causes_have_each_of_them_once(causes: tuple[str, ...])
     assert sorted(one_of(causes, seed) for seed in range(len(causes), 2 * len(causes))) == sorted(causes)
 
 
+@pytest.mark.slow
 def test_a_seed_is_the_same_case_at_every_call():
     one, again = (drawn("decay", 1) for _ in range(2))
     assert (one.cause, one.at, one.more) == (again.cause, again.at, again.more)

@@ -16,29 +16,38 @@ PLAINLY, SLOWLY = 0.25, 0.05
 lacks may be slow as well, and with the likeliest law."""
 
 
-def wandering(fitted: Trial, problem: Problem, least: float, *, mostly: bool = False) -> int | None:
-    """The channel whose zero wanders in a fitted trial, or None; one that is known to do so is none.
+def wandering(fitted: Trial, problem: Problem, least: float, *, mostly: bool = False) -> Problem | None:
+    """The problem in which zeros of channels wander, where they do so in a fitted trial; or None.
 
-    At `least` that share of its innovations is slow, and they are far likelier where the zero may wander. What another
-    law would explain is in part slow, too: where the drift must be `mostly` what is left, the wandering zero has to
-    take half of the covariance of the channel's innovations from sample to sample.
+    At `least` that share of a channel's innovations is slow, and they are far likelier where its zero may wander. What
+    another law would explain is in part slow, too: where the drift must be `mostly` what is left, the wandering zero
+    has to take half of the covariance of the channel's innovations from sample to sample.
     """
     periods = [until * n.record.dt / n.period for n, until in zip(problem.records, problem.until, strict=True)]
     if problem.imposed or min(periods) < _PERIODS:
         return None
+    found = None
+    while (more := _one_more(fitted, found or problem, least, mostly)) is not None:
+        found = more
+    return found
+
+
+def _one_more(fitted: Trial, problem: Problem, least: float, mostly: bool) -> Problem | None:
+    """The problem in which the zero of one more channel wanders, beside those that are known to."""
     posterior, known = problem.posterior_of(fitted), problem.first.readings.wandering
     shares = np.mean([_slow(posterior, fitted, index) for index in range(len(problem.records))], 0)
     shares[list(known)] = 0.0
     channel = int(np.argmax(shares))
     if shares[channel] < least:
         return None
-    wandered = problem.with_wandering(channel).posterior_of(fitted)
+    other = problem.with_wandering(channel)
+    wandered = other.posterior_of(fitted)
     if cost(posterior, fitted.theta) - cost(wandered, fitted.theta) <= THRESHOLDS.searched:
         return None
     if not mostly:
-        return channel
+        return other
     before, after = (_carried_over(p, fitted, channel) for p in (posterior, wandered))
-    return channel if after < THRESHOLDS.half * before else None
+    return other if after < THRESHOLDS.half * before else None
 
 
 def _carried_over(posterior: Posterior, beside: Trial, channel: int) -> float:

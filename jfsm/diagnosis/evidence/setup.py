@@ -73,7 +73,7 @@ class Problem(NamedTuple):
 
     def with_wandering(self, channel: int) -> "Problem":
         """The same, the zero of one more channel wandering."""
-        return self._replace(records=[n.with_wandering((*n.readings.wandering, channel)) for n in self.records])
+        return self._replace(records=[n.with_wandering(sorted((*n.readings.wandering, channel))) for n in self.records])
 
     def with_colour(self, colour: Colour) -> "Problem":
         """The same, the channels' noise having this colour."""

@@ -213,10 +213,9 @@ class Rounds:
         return coloured(self._explaining(found), self.problem)
 
     def _drifting(self, found: Searched, *, mostly: bool = False) -> Problem | None:
-        """The problem with the zero that turns out to wander, or None. Noise that remembers is in part slow as well: it
+        """The problem with the zeros that turn out to wander, or None. Noise that remembers is in part slow as well: it
         is looked for before."""
-        channel = wandering(self._explaining(found), self.problem, SLOWLY, mostly=mostly)
-        return None if channel is None else self.problem.with_wandering(channel)
+        return wandering(self._explaining(found), self.problem, SLOWLY, mostly=mostly)
 
     def _explaining(self, found: Searched) -> Trial:
         """The likeliest hypothesis, where it explains half of what the refitted model leaves; else that model."""

@@ -120,9 +120,9 @@ class Study:
             if not self._lags(late, problem, given, refitted):
                 return late
             return self._sought(problem._replace(ways=()), given, refitted, known)
-        channel = wandering(refitted, problem, PLAINLY)
-        if channel is not None:
-            return self._sought_with(problem.with_wandering(channel), problem, given, refitted, known)
+        other = wandering(refitted, problem, PLAINLY)
+        if other is not None:
+            return self._sought_with(other, problem, given, refitted, known)
         problem, missing = self._moving(problem)
         every = self._candidates(problem, missing)
         rounds = Rounds(every, given, refitted, known, problem, self.steps, self.key, self.pairs)
