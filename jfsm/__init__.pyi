@@ -70,6 +70,7 @@ from .structures import QuadraticDamping as QuadraticDamping
 from .structures import QuadraticStiffness as QuadraticStiffness
 from .structures import QuinticStiffness as QuinticStiffness
 from .structures import Saturation as Saturation
+from .structures import Simulation as Simulation
 from .structures import SineStiffness as SineStiffness
 from .structures import SmoothCoulomb as SmoothCoulomb
 from .structures import SquareStiffness as SquareStiffness

@@ -286,7 +286,7 @@ def along_a_decay(dt: float, law: jfsm.LuGre) -> float:
     rest = jfsm.Structure.sdof(mass=1.0, stiffness=25.0, damping=0.6)
     motion = jnp.asarray(x[:, None]), jnp.asarray(v[:, None]), jnp.asarray(time)
     force = np.asarray(force_along(lower(jfsm.Structure([1.0], [law])), *motion, substeps=64))
-    latent = Latent(x[:, None], v[:, None], force, np.ones_like(force), np.ones(time.size, bool))
+    latent = Latent(x[:, None], v[:, None], 0 * force, force, np.ones_like(force), np.ones(time.size, bool))
     prepared = prepare(jfsm.Record(time, None, x, v), rest)
     share = place(law, latent, rest, scale_of(prepared, rest), prepared)[0].share
     assert share is not None

@@ -39,12 +39,18 @@ class Field(eqx.Module):
     def __call__(self, state: Float[Array, " n"]) -> Float[Array, " n"]:
         """Rate of the state."""
         x, v = jnp.split(state, 2)
-        return jnp.concatenate(
-            [v, free_acceleration(self.plant, self.minv, x, v, jnp.zeros(0), self.load, jnp.zeros(()))]
-        )
+        return jnp.concatenate([v, self._acceleration(x, v)])
+
+    def _acceleration(self, x: Float[Array, " dof"], v: Float[Array, " dof"]) -> Float[Array, " dof"]:
+        return free_acceleration(self.plant, self.minv, x, v, jnp.zeros(0), self.load, jnp.zeros(()))
 
     def force(self, x: Float[Array, " dof"], v: Float[Array, " dof"]) -> Float[Array, " dof"]:
-        """What the terms leave of the constant force, zero at a point of rest [N]."""
+        """What the terms leave of the constant force, zero at a point of rest [N].
+
+        Of a plant with its own motion: what moves its masses at rest as it moves.
+        """
+        if self.plant.own is not None:
+            return -self.mass @ self._acceleration(x, v)
         return smooth_force(self.plant, x, v, jnp.zeros(0), jnp.zeros(())) - self.load
 
     def visited(self, state: Float[Array, " n"]) -> Bool[Array, ""]:
@@ -84,9 +90,9 @@ def autonomous_field(model: Structure, force: Any = None) -> Field:
             )
     plant = lower(model)
     if _depends_on_time(plant):
-        culprit = next(t for t in model.terms if _depends_on_time(lower(Structure(model.mass, [t]))))
+        culprits = [_name(t) for t in model.terms if _depends_on_time(lower(Structure(model.mass, [t])))]
         raise ValueError(
-            f"`model` must not depend on time; the force of {_name(culprit)} does. "
+            f"`model` must not depend on time; the force of {[*culprits, 'its own function'][0]} does. "
             "Leave it out with `model.without(term)`, or follow the motion with `jfsm.simulate`."
         )
     load = np.zeros(model.dof) if force is None else as_array(force, "force", (0, 1))
@@ -101,7 +107,8 @@ def _name(term: AbstractTerm) -> str:
 
 
 def _present_force(plant: Plant, x, v, t):
-    return smooth_force(plant, x, v, jnp.zeros(plant.hidden), t)
+    force = smooth_force(plant, x, v, jnp.zeros(plant.hidden), t)
+    return force if plant.own is None else plant.own(plant.own_numbers, x, v, -force, t)
 
 
 @eqx.filter_jit

@@ -127,6 +127,11 @@ def forced_response(
     check_positive(harmonics=harmonics, step=step, max_points=max_points, amplitude=amplitude)
     if not 1 <= at <= model.dof:
         raise ValueError(f"`at` must be a degree of freedom from 1 to {model.dof}; got {at}.")
+    if model.own is not None:
+        raise ValueError(
+            "`model` must be a structure of masses and terms here; got a simulation, whose mass may change with its "
+            "state. Follow its motion with `jfsm.simulate` until it repeats."
+        )
     system = autonomous_field(with_tables(model))
     rest = displacement(around, model.dof)
     low, high = _range(frequencies, system, rest)

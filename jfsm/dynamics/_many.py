@@ -165,7 +165,7 @@ def _with_number(structure: Structure, place: int, value: float) -> Structure:
     owner, name = [(i, p.name) for i, part in enumerate(parts) for p in part.parameters][place]
     parts[owner] = replace(parts[owner], **{name: value})
     n = len(structure.terms)
-    return Structure(structure.mass, parts[:n], parts[n:], structure.trust)
+    return structure.having(terms=parts[:n], sensors=parts[n:])
 
 
 def _lowered(structures: Sequence[Structure], grid: Grid) -> Plant:

@@ -9,10 +9,10 @@ import numpy as np
 from ..plant import (
     InterpolatedInput,
     Plant,
+    free_acceleration,
     hidden_rate,
     hidden_start,
     inverse_mass,
-    smooth_force,
     true_force,
     undelayed,
 )
@@ -50,8 +50,8 @@ def run_reference(plant: Plant, inputs: InterpolatedInput, x0, v0, tolerance, sc
         first = jnp.clip(jnp.floor(inner).astype(int) - 2, 0, halves - 6)
         near = jax.lax.dynamic_slice(drive, (k, first, 0), (1, 6, dof + 1))[0]
         driving = jnp.sum(_quintic_weights(inner - first)[:, None] * near, 0)
-        acceleration = jnp.sum(minv * (driving[:dof] - smooth_force(plant, x, v, z, t))[None, :], 1)
-        return v, acceleration, hidden_rate(plant, x, v, z, t, driving[dof])
+        a = free_acceleration(plant, minv, x, v, z, driving[:dof], t)
+        return v, a, hidden_rate(plant, x, v, z, t, driving[dof])
 
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(slope),

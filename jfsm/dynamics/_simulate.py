@@ -468,7 +468,7 @@ def with_tables(model: Structure) -> Structure:
         else t
         for t in model.terms
     ]
-    return Structure(model.mass, terms, model.sensors, model.trust)
+    return model.having(terms=terms)
 
 
 def _imposed_response(model: Structure, record: Record) -> Response:
@@ -477,8 +477,7 @@ def _imposed_response(model: Structure, record: Record) -> Response:
     substeps = finer(imposed_substeps(model, record.dt, typical_size(record)))
     # Gain and delay of the force's sensor concern readings only.
     plain = [s for s in model.sensors if not isinstance(s, ForceGain | ForceDelay)]
-    structure = Structure(model.mass, model.terms, plain, model.trust)
-    plant = lower(structure, channels, grid=Grid(record.dt, substeps))
+    plant = lower(model.having(sensors=plain), channels, grid=Grid(record.dt, substeps))
     force = force_needed(plant, observation_of(channels, model.dof), path.imposed(substeps, bucket(len(record))))
     return Response(
         record.time, *path.motion(record.time), Result.successful, None, "grid", model.sensors,

@@ -46,6 +46,7 @@ from ..plant import (
     holding_force,
     in_mode,
     inverse_mass,
+    inverse_mass_at,
     linearised,
     load_of,
     mode_at,
@@ -395,7 +396,8 @@ def _read(plant: Plant, known: Known, observation, of_zeros, state: State, load:
     # A link that sticks stays so while the update leaves it at rest; otherwise its speed decides.
     pushed = jnp.abs(jnp.sum(rows * (v - motion.v)[None, :], 1))
     still = (motion.mode == 0) & (pushed <= known.nothing)
-    v = v - stopping(known.minv, rows, jnp.sum(rows * v[None, :], 1), still)
+    minv = inverse_mass_at(plant, known.minv, x, v, load.time)
+    v = v - stopping(minv, rows, jnp.sum(rows * v[None, :], 1), still)
     moving = Motion(x, v, settle(plant, x, z), mode_at(plant, known.minv, x, v, z, load.force[0], load.time, still))
     return moving, updated, zeros, push(state.buffer, x, v), found
 
@@ -405,11 +407,12 @@ def _carried_on(plant: Plant, known: Known, motion: Motion, after: Motion, updat
     drives it halfway."""
     x, v, z = ((a + b) / 2 for a, b in zip(motion[:3], after[:3], strict=True))
     free, rates = linearised(plant, known.minv, x, v, z, g, time + dt / 2)
-    step = beside(_transition(plant, known.minv, motion, after, rates, dt, substeps), known.transition)
+    minv = inverse_mass_at(plant, known.minv, x, v, time + dt / 2)
+    step = beside(_transition(plant, minv, motion, after, rates, dt, substeps), known.transition)
     moving = _product(_product(step, updated), step.T) + beside(known.added, known.process_noise)
     slope = with_friction(plant, known.minv, x, v, motion.mode, free, time + dt / 2)[0]
     overrun = _overrun(plant, motion, after, moving, slope, dt)
-    return _rest(plant, known.minv, moving, after.mode), overrun, step
+    return _rest(plant, minv, moving, after.mode), overrun, step
 
 
 def innovations(
@@ -570,6 +573,7 @@ def _predict(plant, minv, observation, c, mean, covariance, mode, overrun, load:
         return jnp.sum(select * mean[dof : 2 * dof]), jnp.concatenate([none, select, hidden]), certain
     x, v, z = mean[:dof], mean[dof : 2 * dof], mean[2 * dof :]
     without = linearised(plant, minv, x, v, z, load.force[0], load.time)
+    minv = inverse_mass_at(plant, minv, x, v, load.time)
     if len(plant.friction) == 1:
         a, by_state, log_share = _most_probable_mode(
             plant, minv, select, c, mean, covariance, mode[0], overrun[0], load, without, y, use, variance, gain,

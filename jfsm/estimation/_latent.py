@@ -23,7 +23,17 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from .._traced import jit_kept
 from .._types import Array
-from ..plant import InterpolatedInput, Observation, Plant, bucket, force_along, shifted, undelayed
+from ..plant import (
+    InterpolatedInput,
+    Observation,
+    Plant,
+    bucket,
+    force_along,
+    linear_part,
+    own_force,
+    shifted,
+    undelayed,
+)
 from ._kalman import LinearModel, log_likelihood, smoothed, swell_of
 
 _MEMORIES = (0.15, 1.0)
@@ -47,8 +57,9 @@ class Latent:
 
     Attributes
     ----------
-    displacement, velocity, force : (n, dof) arrays
-        `force` stands on the left-hand side, restoring side positive, beside everything the model has.
+    displacement, velocity, acceleration, force : (n, dof) arrays
+        `acceleration` is relative to the base. `force` stands on the left-hand side, restoring side positive, beside
+        everything the model has.
     std : (n, dof) array
         Standard error of `force`.
     moves : (n,) array of bool
@@ -57,6 +68,7 @@ class Latent:
 
     displacement: Float[np.ndarray, "n dof"]
     velocity: Float[np.ndarray, "n dof"]
+    acceleration: Float[np.ndarray, "n dof"]
     force: Float[np.ndarray, "n dof"]
     std: Float[np.ndarray, "n dof"]
     moves: Bool[np.ndarray, " n"]
@@ -137,7 +149,7 @@ def latent_force(
     beliefs = [_Belief(tau / omega, share * even) for tau, share in product(_MEMORIES, _AMPLITUDES)]
     models = [make(*belief) for belief in beliefs]
     data = (true, seen, use)
-    dof = plant.dof
+    dof, minv = plant.dof, np.linalg.inv(np.asarray(plant.mass))
     period = max(int(2 * np.pi / (omega * dt)), 1)
 
     def most_likely(models: list[_Model], beliefs: list[_Belief], swell: np.ndarray) -> _Likely:
@@ -174,9 +186,17 @@ def latent_force(
         if plant.laws
         else np.zeros_like(x)
     )
-    x, v, r, known, std = (q[:n] for q in (x, v, r, known, std))
+    linear = linear_part(plant)
+    a = (true[:, 0] - r - x @ np.asarray(linear.stiffness).T - v @ np.asarray(linear.damping).T) @ minv.T
+    if plant.own is not None:
+        along = jnp.asarray(x), jnp.asarray(v), jnp.asarray(a), inputs.time[:padded]
+        needed, mass, _ = map(np.asarray, own_force(plant, *along))
+        r, known = true[:, 0] - needed, known + x @ np.asarray(plant.stiffness).T + v @ np.asarray(plant.damping).T
+        force_std = np.sqrt(np.einsum("nij,nj->ni", (mass @ minv) ** 2, std[:, 2 * dof :] ** 2))
+        std = np.concatenate([std[:, : 2 * dof], force_std], 1)
+    x, v, a, r, known, std = (q[:n] for q in (x, v, a, r, known, std))
     moves = maximum_filter1d(np.abs(v), period, axis=0) > _CERTAIN * std[:, dof : 2 * dof]
-    return Latent(x, v, r - known, std[:, 2 * dof :], np.any(moves, 1))
+    return Latent(x, v, a, r - known, std[:, 2 * dof :], np.any(moves, 1))
 
 
 def _on_time(plant: Plant, seen: np.ndarray, use: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
@@ -195,9 +215,9 @@ def _model(
     plant: Plant, observation: Observation, dt, substeps, force_covariance, variance, omega, length, tau, amplitude
 ) -> _Model:
     dof = plant.dof
-    minv = np.linalg.inv(np.asarray(plant.mass))
+    minv, linear = np.linalg.inv(np.asarray(plant.mass)), linear_part(plant)
     zero, eye = np.zeros((dof, dof)), np.eye(dof)
-    k, c = np.asarray(plant.stiffness), np.asarray(plant.damping)
+    k, c = np.asarray(linear.stiffness), np.asarray(linear.damping)
     rate = np.block([[zero, eye, zero], [-minv @ k, -minv @ c, -minv], [zero, zero, -eye / tau]])
     gain = np.concatenate([zero, minv, zero])
     n = 3 * dof

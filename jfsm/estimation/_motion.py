@@ -176,6 +176,11 @@ def _untold(found: Motion, record: Record) -> tuple[str, ...]:
 def _with_model(record: Record, model: Structure, places: Sequence[Place] | None) -> Motion:
     """The motion of a structure, and the force that it lacks."""
     check_pair(model, record)
+    if model.own is not None:
+        raise ValueError(
+            "`model` must be a structure of masses and terms here; got a simulation. Leave it out: the motion is then "
+            "estimated from the channels alone."
+        )
     channels = tuple(record.responses)
     require_seen(model, channels, record.at_rest)
     if places is None:

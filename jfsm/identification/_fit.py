@@ -251,7 +251,7 @@ def without_small_offsets(
         theta, covariance = theta - along * theta[k], covariance - np.outer(along, covariance[k])
     kept = [s for s in structure.sensors if not isinstance(s, Offset) or f"{s.kind}@{s.place}.b" in first]
     values = {path: unknowns[k].value(theta[k]) for path, k in first.items()}
-    return Structure(structure.mass, structure.terms, kept, structure.trust).with_values(values)
+    return structure.having(sensors=kept).with_values(values)
 
 
 def _scales(unknowns: Sequence[Unknown], theta: np.ndarray) -> list[float]:

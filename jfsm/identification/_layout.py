@@ -28,6 +28,7 @@ _PARTS = (
     "channel_gain",
     "channel_offset",
     "channel_delay",
+    "own_numbers",
 )
 _SLOTS = ("smooth", "friction", "memory", "delayed")
 

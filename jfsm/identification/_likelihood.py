@@ -213,7 +213,7 @@ class Scene:
         """Whether anything but linear springs, dashpots and masses acts."""
         plant = self.plant
         others = plant.friction, plant.memory, plant.delayed, plant.maps
-        return any(len(part) for part in others) or bool(np.any(plant.smooth.direction))
+        return any(len(part) for part in others) or bool(np.any(plant.smooth.direction)) or plant.own is not None
 
     @cached_property
     def lowered(self) -> tuple[list[Array], Any]:

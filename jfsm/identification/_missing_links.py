@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..structures import LinearStiffness, Structure
+from ..structures import LinearStiffness
 from ._posterior import Hypothesis, Posterior
 from ._unknowns import Unknown
 
@@ -56,13 +56,8 @@ def missing_links(posterior: Posterior, theta: np.ndarray, lane: int) -> list[Mi
     pairs = structure.untied(LinearStiffness) if structure.dof > 1 else []
     if not pairs:
         return []
-    tied = Structure(
-        structure.mass,
-        (*structure.terms, *(LinearStiffness(0.0, at=pair) for pair in pairs)),
-        structure.sensors,
-        structure.trust,
-    )
-    natural = max(map(float, structure.mass)) * posterior.records[0].omega ** 2
+    tied = structure.having(terms=(*structure.terms, *(LinearStiffness(0.0, at=pair) for pair in pairs)))
+    natural = float(np.max(np.asarray(structure.mass))) * posterior.records[0].omega ** 2
     scale = max((float(t.k) for t in structure.terms if isinstance(t, LinearStiffness)), default=natural)
     springs = tuple(
         Unknown(f"{LinearStiffness.kind}@{i}-{j}.k", 0.0, scale, False, 0.0, 1.0, low=-1.0, high=1.0) for i, j in pairs

@@ -24,6 +24,7 @@ from ..plant import (
     fastest_mode,
     imposed_motion,
     imposed_substeps,
+    linear_part,
     lower,
     noise_of,
     observation_of,
@@ -487,7 +488,7 @@ def _rate(y: np.ndarray, dt: float) -> float:
 
 def _period(model: Structure, omega: float) -> float:
     """A period of the motion; where nothing is elastic, a part of the time in which damping stops it."""
-    plant = lower(model)
+    plant = linear_part(lower(model))
     rates = np.abs(np.linalg.eigvals(np.linalg.solve(_mass(model), np.asarray(plant.damping))))
     if fastest_mode(plant) > 0 or not np.all(rates > 0):
         return 2 * math.pi / omega

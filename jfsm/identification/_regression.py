@@ -10,12 +10,13 @@ from functools import cached_property
 from itertools import compress
 from typing import NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.stats import qmc
 
 from ..estimation import Latent
-from ..plant import HIDDEN_SUBSTEPS, bucket, direction, forces_of_law
+from ..plant import HIDDEN_SUBSTEPS, bucket, direction, forces_of_law, lower, own_force
 from ..structures import AbstractTerm, LinearDamping, LinearStiffness, Scale, Structure
 from ._nuisances import Nuisances
 
@@ -110,7 +111,7 @@ class Regression:
             forces_along(t, np.array([t.values], dtype=float), motion)[0, :n, None] * direction(t.at, missing.shape[1])
             for t in others
         ]
-        basis, doubt = _basis(latent, structure, beside)
+        basis, doubt = _basis(latent, structure, nuisances.record.time[:n], beside)
         return cls(law, motion, moves, missing, spread, basis[moves] / spread[:, None], doubt, np.zeros(len(doubt)))
 
     def every(self, samples: int) -> "Regression":
@@ -286,8 +287,11 @@ def forces_along(law: AbstractTerm, numbers: np.ndarray, motion: Motion, finer: 
     )
 
 
-def _basis(latent: Latent, structure: Structure, beside: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Forces (n, dof, off) of what may be off besides, and how far: springs, dashpots, constants; given forces."""
+def _basis(
+    latent: Latent, structure: Structure, time: np.ndarray, beside: Sequence[np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Forces (n, dof, off) of what may be off besides, and how far: springs, dashpots, a simulation's own numbers,
+    constants; given forces."""
     n, dof = latent.force.shape
     columns, doubt = list(beside), [1.0] * len(beside)
     for term in structure.terms:
@@ -296,6 +300,11 @@ def _basis(latent: Latent, structure: Structure, beside: Sequence[np.ndarray]) -
             motion = (latent.displacement if spring else latent.velocity) @ row
             columns.append(float(term.values[0]) * motion[:, None] * row)
             doubt.append(_SPRING if spring else _DASHPOT)
+    if structure.own is not None:  # what it would need more were a number of its own larger
+        motion = latent.displacement, latent.velocity, latent.acceleration
+        by_number = np.asarray(own_force(lower(structure), *map(jnp.asarray, (*motion, time)))[2])
+        columns += list(np.moveaxis(by_number, 2, 0))
+        doubt += [_DASHPOT] * by_number.shape[2]
     for j in range(dof):
         columns.append(np.ones((n, 1)) * (np.arange(dof) == j) * np.std(latent.force))
         doubt.append(_CONSTANT)

@@ -78,7 +78,8 @@ def _measured(plant: Plant, nuisances: Nuisances, values: np.ndarray, use: np.nd
         lacking = (values[:, i] - known[:, j]) / (1.0 + float(plant.force_gain[j]))
         left[:, j] = np.interp(np.arange(n), np.flatnonzero(seen), lacking[seen])
         std[:, j] = nuisances.floor[i]
-    return Latent(np.asarray(imposed.x)[:n, 0], np.asarray(imposed.v)[:n, 0], left, std, np.ones(n, bool))
+    x, v, a = (np.asarray(q)[:n, 0] for q in (imposed.x, imposed.v, imposed.a))
+    return Latent(x, v, a, left, std, np.ones(n, bool))
 
 
 def _laws(structure: Structure) -> tuple[AbstractTerm, ...]:
@@ -129,7 +130,7 @@ def natural_starts(structure: Structure, nuisances: Nuisances, count: int) -> li
 def _with(structure: Structure, instead: Mapping[int, AbstractTerm]) -> Structure:
     """The structure with some of its terms, by identity, replaced."""
     terms = [instead.get(id(term), term) for term in structure.terms]
-    return Structure(structure.mass, terms, structure.sensors, structure.trust)
+    return structure.having(terms=terms)
 
 
 def place(

@@ -51,6 +51,8 @@ from ._law_along import force_at as force_at
 from ._law_along import forces_of_law as forces_of_law
 from ._needed import force_needed as force_needed
 from ._needed import needed as needed
+from ._own_motion import linear_part as linear_part
+from ._own_motion import own_force as own_force
 from ._pair import check_pair as check_pair
 from ._plant import Channel as Channel
 from ._plant import Grid as Grid
@@ -73,6 +75,7 @@ from ._stepper import free_acceleration as free_acceleration
 from ._stepper import holding_force as holding_force
 from ._stepper import in_mode as in_mode
 from ._stepper import inverse_mass as inverse_mass
+from ._stepper import inverse_mass_at as inverse_mass_at
 from ._stepper import linearised as linearised
 from ._stepper import mode_at as mode_at
 from ._stepper import stopping as stopping

@@ -15,6 +15,7 @@ from ..structures import Clipping, LinearDamping, LinearStiffness, Structure
 from ._drive import Reconstruction, reconstruct
 from ._forces import State, hidden_start
 from ._grid import InterpolatedInput
+from ._own_motion import linear_part
 from ._plant import Plant, direction, numbers_of
 from ._stepper import inverse_mass, linearised
 
@@ -77,6 +78,7 @@ def bucket(n: int) -> int:
 
 def fastest_mode(plant: Plant) -> float:
     """Largest natural frequency of the linear part [rad/s]; 0 where nothing is elastic."""
+    plant = linear_part(plant)
     eigenvalues = np.linalg.eigvals(np.linalg.solve(np.asarray(plant.mass), np.asarray(plant.stiffness)))
     return float(np.sqrt(np.max(np.abs(eigenvalues))))
 
@@ -130,7 +132,7 @@ def substeps_for(structure: Structure, dt: float, size: Size | Swing | None = No
             "Leave that spring, dashpot or small mass out of the model, or use a record of a higher rate."
         )
     own = 2 ** math.ceil(math.log2(max(1.0, fastest * dt / _STEP_ANGLE)))
-    if not len(plant.smooth) + len(plant.memory):
+    if not len(plant.smooth) + len(plant.memory) and plant.own is None:
         return min(_MOST_SUBSTEPS, own)
     own = max(own, _KINKED_SUBSTEPS if len(plant.memory) else 1)
     known = isinstance(size, Swing)

@@ -19,6 +19,12 @@ def check_pair(model: Structure, record: Record, *, imposed: bool = False) -> No
         raise ValueError(f"`record` must hold at least 2 samples; it has {len(record)}.")
     if record.dofs > model.dof:
         raise ValueError(f"`record` names degree of freedom {record.dofs}; the structure has {model.dof}.")
+    if model.own is not None and (record.drive == "motion" or record.base_acceleration is not None):
+        raise ValueError(
+            "`record` must hold the forces that drive, as samples of force={...}, for a simulation: it has "
+            f"{'drive=motion' if record.drive == 'motion' else 'a moving base'}. A base that moves is part of the "
+            "simulation's own function: its inertia forces go into `force`."
+        )
     if record.drive == "motion":
         if imposed:
             return

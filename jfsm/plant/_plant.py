@@ -30,6 +30,7 @@ from ..structures import (
     LinearStiffness,
     MapTerm,
     Offset,
+    OwnMotion,
     StiffnessDrop,
     Structure,
 )
@@ -116,7 +117,8 @@ class Plant(eqx.Module):
     """Arrays of a structure and of its sensors, for one list of response channels.
 
     `force_gain`, `force_offset` and `channel_offset` are empty where every lane has its own elsewhere, `force_delay`
-    and `channel_delay` without delayed sensors: delays have programs of their own.
+    and `channel_delay` without delayed sensors: delays have programs of their own. The plant of a simulation moves by
+    its `own` function of `own_numbers`, and `mass` is the mass matrix at rest; the terms act beside.
     `late_channel` holds the channel of each channel delay. Delayed forces reach back at most `reach` samples. With
     `rolled` stages of a step the program is a third smaller, as fast for one motion and its derivatives, and half as
     fast for many motions. Plants side by side have a leading axis of lanes on every array but those of whole numbers.
@@ -137,6 +139,8 @@ class Plant(eqx.Module):
     force_delay: Float[Array, "*lanes dof_or_none"]
     channel_delay: Float[Array, "*lanes late"]
     late_channel: Int[Array, " late"]
+    own_numbers: Float[Array, "*lanes own"]
+    own: OwnMotion | None = eqx.field(static=True)
     reach: int = eqx.field(static=True)
     rolled: bool = eqx.field(static=True)
 
@@ -149,12 +153,13 @@ class Plant(eqx.Module):
         """Whether it needs sums, products and functions alone: no delayed forces, maps or users' laws."""
         tables = (SMOOTH_TERMS, FRICTION_TERMS, MEMORY_TERMS)
         known = all(s.laws == table for s, table in zip((self.smooth, self.friction, self.memory), tables, strict=True))
-        return known and not self.maps and not len(self.delayed)
+        return known and not self.maps and not len(self.delayed) and self.own is None
 
     @property
     def laws(self) -> int:
-        """Number of terms, without linear springs and dashpots."""
-        return sum(map(len, (self.smooth, self.friction, self.memory, self.delayed, self.maps)))
+        """Number of terms, without linear springs and dashpots; a function of its own is one."""
+        terms = sum(map(len, (self.smooth, self.friction, self.memory, self.delayed, self.maps)))
+        return terms + (self.own is not None)
 
     @property
     def hidden(self) -> int:
@@ -266,6 +271,7 @@ def numbers_of(
         "force_delay": sensed["force_delay"] if ForceDelay in kinds else np.zeros(0),
         "channel_delay": np.array(list(channel_delay.values()), dtype=float),
         "late_channel": np.array(list(channel_delay), dtype=int),
+        "own_numbers": structure.own_numbers if is_traced(structure.own_numbers) else np.asarray(structure.own_numbers),
     }
     return Plant(
         **arrays,
@@ -274,6 +280,7 @@ def numbers_of(
         memory=_slots(laws.memory, MEMORY_TERMS, 0, dof),
         delayed=_slots(laws.delayed, DELAYED_TERMS, 0, dof),
         maps=tuple(MapSlot(term.force_map, jnp.asarray(direction(term.at, dof))) for term in laws.maps),
+        own=structure.own,
         reach=_REACH if grid is None else grid.reach(laws.delayed),
         rolled=rolled,
     )

@@ -59,9 +59,15 @@ def times(matrix: Float[Array, "rows columns"], vector: Float[Array, " columns"]
     return jnp.sum(matrix * vector[None, :], 1)
 
 
+def inverse_mass_at(plant: Plant, minv: Square, x: State, v: State, t: Scalar) -> Square:
+    """Inverse of the mass matrix in a state: that of a plant with its own motion is another one in every state."""
+    return minv if plant.own is None else plant.own.answer(plant.own_numbers, x, v, t)
+
+
 def free_acceleration(plant: Plant, minv: Square, x: State, v: State, z: Hidden, g: State, t: Scalar) -> State:
     """Acceleration without friction."""
-    return times(minv, g - smooth_force(plant, x, v, z, t))
+    net = g - smooth_force(plant, x, v, z, t)
+    return times(minv, net) if plant.own is None else plant.own(plant.own_numbers, x, v, net, t)
 
 
 def linearised(
@@ -119,6 +125,7 @@ def with_friction(
     """`acceleration`, from the one without friction."""
     if not len(plant.friction):
         return a, mode
+    minv = inverse_mass_at(plant, minv, x, v, t)
     low, high = friction_limits(plant, x, v, t)
     rows = plant.friction.direction
     sliding = jnp.where(mode > 0, high, jnp.where(mode < 0, low, 0.0))
@@ -154,9 +161,10 @@ def _from_rest(plant: Plant, minv, x, v, z, g, t, mode, broken):
     # known to have broken follows the pull: at the instant itself rounding decides about the limit.
     rows, rest = plant.friction.direction, mode == 0
     low, high = friction_limits(plant, x, v, t)
+    there = inverse_mass_at(plant, minv, x, v, t)
     sliding = jnp.where(mode > 0, high, jnp.where(mode < 0, low, 0.0))
-    a = free_acceleration(plant, minv, x, v, z, g, t) - times(minv, jnp.sum(rows * sliding[:, None], 0))
-    held = holding_force(plant, minv, a, rest)
+    a = free_acceleration(plant, minv, x, v, z, g, t) - times(there, jnp.sum(rows * sliding[:, None], 0))
+    held = holding_force(plant, there, a, rest)
     low, high = jnp.where(broken, (low + high) / 2, low), jnp.where(broken, (low + high) / 2, high)
     return jnp.where(rest, jnp.where(held > high, 1.0, jnp.where(held < low, -1.0, 0.0)), mode)
 
@@ -244,7 +252,8 @@ def through_events(plant: Plant, minv: Square, motion: Motion, end: Motion, load
         xs, vs, zs = path(share)
         now = start + left * share
         switching = ended & (shares == share)
-        vs = vs - stopping(minv, rows, jnp.sum(rows * vs[None, :], 1), switching & (mode != 0))
+        there = inverse_mass_at(plant, minv, xs, vs, load.time + now * load.step)
+        vs = vs - stopping(there, rows, jnp.sum(rows * vs[None, :], 1), switching & (mode != 0))
         resting = jnp.where(switching, 0.0, mode)
         broken = switching & (mode == 0)
         decided = _from_rest(plant, minv, xs, vs, zs, load.at(now), load.time + now * load.step, resting, broken)

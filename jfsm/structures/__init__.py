@@ -1,8 +1,10 @@
 """What is believed: structures made of terms and sensors."""
 
+from ._catalogue import OWN_VALUE as OWN_VALUE
 from ._catalogue import PARAMETER_CAUSES as PARAMETER_CAUSES
 from ._catalogue import Cause as Cause
 from ._catalogue import causes as causes
+from ._own_motion import OwnMotion as OwnMotion
 from ._sensors import AbstractSensor as AbstractSensor
 from ._sensors import AccelerationBias as AccelerationBias
 from ._sensors import AccelerationGain as AccelerationGain
@@ -12,6 +14,7 @@ from ._sensors import ForceDelay as ForceDelay
 from ._sensors import ForceGain as ForceGain
 from ._sensors import Offset as Offset
 from ._sensors import is_offset as is_offset
+from ._simulation import Simulation as Simulation
 from ._structure import Structure as Structure
 from ._term import AbstractFriction as AbstractFriction
 from ._term import AbstractTerm as AbstractTerm

@@ -14,6 +14,7 @@ from ._sensors import (
     ForceGain,
 )
 from ._structure import MASS, Structure
+from ._term import Parameter
 from .terms import (
     AttachedOscillator,
     BilinearDamping,
@@ -129,12 +130,20 @@ class _Mass:
     parameters = (MASS,)
 
 
+class _Own:
+    """Stands for the numbers of a simulation's own function."""
+
+    kind = "own"
+    parameters = (Parameter("value"),)
+
+
 _CAUSES = (
     Cause("stiffness_value", "parameters", "a wrong stiffness", LinearStiffness, 0,
           "a spring is stiffer or softer than stated"),
     Cause("damping_value", "parameters", "a wrong damping", LinearDamping, 0,
           "a dashpot is stronger or weaker than stated"),
     Cause("mass_value", "parameters", "a wrong mass", _Mass, 0, "a mass is larger or smaller than stated"),
+    Cause("own_value", "parameters", "a wrong number", _Own, 0, "a number of a simulation's own function is off"),
     Cause("cubic_hardening", "stiffness", "a cubic hardening spring", CubicStiffness, 1,
           "the spring grows stiffer with the square of the displacement"),
     Cause("cubic_softening", "stiffness", "a cubic softening spring", CubicStiffness, -1,
@@ -221,6 +230,8 @@ _CAUSES = (
           "it shows nothing beyond its range"),
 )  # fmt: skip
 
+OWN_VALUE = "own_value"
+"""Cause id of a number of a simulation's own function that is wrong."""
 PARAMETER_CAUSES = {"stiffness": "stiffness_value", "damping": "damping_value", "mass": "mass_value"}
 """Cause id of an own value that is wrong, by the kind in its path."""
 

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._types import as_array, as_numbers, is_traced
+from ._own_motion import OwnMotion
 from ._sensors import AbstractSensor
 from ._term import AbstractTerm, Parameter
 from .terms import LinearDamping, LinearStiffness
@@ -41,6 +42,9 @@ class Structure(eqx.Module):
     terms: tuple[AbstractTerm, ...]
     sensors: tuple[AbstractSensor, ...]
     trust: tuple[tuple[str, float], ...] = eqx.field(static=True)
+    own: OwnMotion | None = eqx.field(static=True, repr=False)
+    """The function that a `Simulation` moves by."""
+    own_numbers: Float[Any, " own"] = eqx.field(repr=False)
 
     def __init__(
         self,
@@ -57,6 +61,7 @@ class Structure(eqx.Module):
         self.terms = tuple(terms)
         self.sensors = tuple(sensors)
         self.trust = tuple(dict(trust).items())
+        self.own, self.own_numbers = None, np.zeros(0)
         for term in self.terms:
             if not isinstance(term, AbstractTerm):
                 raise TypeError(f"`terms` must hold terms such as jfsm.LinearStiffness(9.0, at=(0, 1)); got {term!r}.")
@@ -155,6 +160,15 @@ class Structure(eqx.Module):
         )
         return cls.from_matrices((mass + mass.T) / 2, (stiffness + stiffness.T) / 2, (damping + damping.T) / 2)
 
+    def having(self, *, terms: Any = None, sensors: Any = None, trust: Any = None) -> "Structure":
+        """The same plant with other terms, sensors or trust."""
+        return Structure(
+            self.mass,
+            self.terms if terms is None else terms,
+            self.sensors if sensors is None else sensors,
+            self.trust if trust is None else trust,
+        )
+
     @property
     def dof(self) -> int:
         """Number of degrees of freedom."""
@@ -183,9 +197,9 @@ class Structure(eqx.Module):
 
     def __add__(self, other: AbstractTerm | AbstractSensor) -> "Structure":
         if isinstance(other, AbstractTerm):
-            return Structure(self.mass, (*self.terms, other), self.sensors, self.trust)
+            return self.having(terms=(*self.terms, other))
         if isinstance(other, AbstractSensor):
-            return Structure(self.mass, self.terms, (*self.sensors, other), self.trust)
+            return self.having(sensors=(*self.sensors, other))
         return NotImplemented
 
     def without(self, part: AbstractTerm | AbstractSensor) -> "Structure":
@@ -194,7 +208,7 @@ class Structure(eqx.Module):
         sensors = [sensor for sensor in self.sensors if sensor is not part]
         if len(terms) + len(sensors) == len(self.terms) + len(self.sensors):
             raise ValueError(f"`part` must be one of the structure's own terms or sensors; got {part!r}.")
-        return Structure(self.mass, terms, sensors, self.trust)
+        return self.having(terms=terms, sensors=sensors)
 
     def uncertain(self, **relative: float) -> "Structure":
         """The same structure with stated trust: ``uncertain(stiffness=0.05)`` says stiffnesses are right to 5 %."""
@@ -203,14 +217,11 @@ class Structure(eqx.Module):
                 raise ValueError(f"The uncertainty of `{name}` must be a positive share such as 0.05; got {value!r}.")
             if not self.select(name):
                 raise ValueError(f"`{name}` names no parameter of this structure; it has {', '.join(self.values())}.")
-        return Structure(self.mass, self.terms, self.sensors, {**dict(self.trust), **relative})
+        return self.having(trust={**dict(self.trust), **relative})
 
     def entries(self) -> dict[str, tuple[Parameter, Float[Array, ""]]]:
         """Every number of the structure by path (``mass@1``, ``stiffness@0-1.k``), with what it is."""
-        found: dict[str, tuple[Parameter, Float[Array, ""]]] = {}
-        diagonal = self.mass if self.mass.ndim == 1 else jnp.diag(self.mass)
-        for i in range(self.dof):
-            found[f"mass@{i + 1}"] = (MASS, diagonal[i])
+        found = self._own_entries()
         for part in (*self.terms, *self.sensors):
             for parameter in part.parameters:
                 path = base = f"{part.kind}@{part.place}.{parameter.name}"
@@ -219,6 +230,11 @@ class Structure(eqx.Module):
                     path, count = f"{base}#{count}", count + 1
                 found[path] = (parameter, getattr(part, parameter.name))
         return found
+
+    def _own_entries(self) -> dict[str, tuple[Parameter, Float[Array, ""]]]:
+        """The numbers of the plant itself."""
+        diagonal = self.mass if self.mass.ndim == 1 else jnp.diag(self.mass)
+        return {f"mass@{i + 1}": (MASS, diagonal[i]) for i in range(self.dof)}
 
     def values(self) -> dict[str, float]:
         """Every number of the structure by path."""
@@ -234,12 +250,8 @@ class Structure(eqx.Module):
         unknown = [path for path in values if path not in known]
         if unknown:
             raise ValueError(f"{unknown[0]!r} names no parameter of this structure; it has {', '.join(known)}.")
-        mass = np.array(self.mass)
         paths = iter(known)
-        for i in range(self.dof):
-            value = values.get(next(paths))
-            if value is not None:
-                mass[i if mass.ndim == 1 else (i, i)] = value
+        own = [values.get(next(paths)) for _ in self._own_entries()]
         parts = []
         for part in (*self.terms, *self.sensors):
             for parameter in part.parameters:
@@ -248,7 +260,16 @@ class Structure(eqx.Module):
                     part = replace(part, **{parameter.name: float(value)})  # checked like a new one
             parts.append(part)
         n = len(self.terms)
-        return Structure(mass, parts[:n], parts[n:], self.trust)
+        return self._with_own_values(own, parts[:n], parts[n:])
+
+    def _with_own_values(self, values: list[Any], terms: list[Any], sensors: list[Any]) -> "Structure":
+        """The same plant with other parts and with these values, in the order of `_own_entries`, where they are not
+        None."""
+        mass = np.array(self.mass)
+        for i, value in enumerate(values):
+            if value is not None:
+                mass[i if mass.ndim == 1 else (i, i)] = value
+        return Structure(mass, terms, sensors, self.trust)
 
     def describe(self, units: Mapping[str, str] | None = None) -> list[str]:
         """One line per number, with units."""

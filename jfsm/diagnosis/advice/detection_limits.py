@@ -152,9 +152,10 @@ class _Seen:
         if not math.isfinite(factor):
             return None
         structure = self.posterior.structure(self.grown(theta, math.log(factor)))
-        law = structure.terms[-1]
-        if not self.effects[0].cause.is_sensor and law.otherwise(structure.stiffness_of(law.at)):
-            return None
+        if not self.effects[0].cause.is_sensor:
+            law = structure.terms[-1]
+            if law.otherwise(structure.stiffness_of(law.at)):
+                return None
         values = structure.values()
         return Smallest(self.effects, structure, self.path, {p: values[p] for p in self.paths})
 

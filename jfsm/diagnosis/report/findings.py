@@ -8,7 +8,7 @@ import numpy as np
 
 from ...identification import Nuisances, Unknown
 from ...reporting import place_name
-from ...structures import PARAMETER_CAUSES, ChannelDelay, Clipping, ForceDelay, Structure, is_offset
+from ...structures import OWN_VALUE, PARAMETER_CAUSES, ChannelDelay, Clipping, ForceDelay, Structure, is_offset
 from .._diagnosis import FOUND, CandidateResult, Finding, Rival
 from ..advice.next_test import RIVAL
 from ..channels.clipping import clipped_channel
@@ -140,27 +140,25 @@ def _wrong_values(t: Trial, probability: float, model: Structure, units: Units) 
     for k, u in enumerate(t.unknowns):
         if not _is_physical(u, stated) or not (u.path in apart or _has_moved(t, k)):
             continue
-        kind, place = u.path.split(".")[0].split("@")
-        at = tuple(int(p) for p in place.split("-"))
-        name = u.path.split(".")[-1] if "." in u.path else "mass"
-        value = estimate(t, u.path, units)
+        kind, _, place = u.path.split(".")[0].partition("@")
+        at = tuple(int(p) for p in place.split("-")) if place else ()
+        name = u.path.split(".")[-1] if "." in u.path else kind
+        value, cause = estimate(t, u.path, units), PARAMETER_CAUSES.get(kind, OWN_VALUE)
         sentence = f"{kind} is off: stated {stated[u.path]:.6g}, found {value.value:.6g}"
         finding = Finding(
-            PARAMETER_CAUSES[kind], "parameters", at, probability, {name: value}, (), sentence,
-            "a wrong value", probability, members={PARAMETER_CAUSES[kind]: probability}, size=value,
+            cause, "parameters", at, probability, {name: value}, (), sentence,
+            "a wrong value", probability, members={cause: probability}, size=value,
         )  # fmt: skip
         found.append((_moved(t, k) / u.width, finding))
     return tuple(f for _, f in sorted(found, key=lambda item: -item[0]))
 
 
 def _is_physical(u: Unknown, stated: dict[str, float]) -> bool:
-    """Whether an unknown is a stated mass, stiffness or damping, of the first record where records differ."""
-    return (
-        u.path in stated
-        and not is_offset(u.path)
-        and u.record in (None, 0)
-        and u.path.split("@")[0] in PARAMETER_CAUSES
-    )
+    """Whether an unknown is a stated mass, stiffness or damping, or a simulation's own number, of the first record
+    where records differ."""
+    kind, at, _ = u.path.partition("@")
+    physical = kind in PARAMETER_CAUSES or not at
+    return physical and u.path in stated and not is_offset(u.path) and u.record in (None, 0)
 
 
 def _moved(t: Trial, k: int) -> float:

@@ -1,0 +1,175 @@
+"""A simulation of the user's own: a function that answers a force with an acceleration."""
+
+from collections.abc import Iterable, Mapping
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .._types import as_numbers, is_traced
+from ._own_motion import Acceleration, OwnMotion
+from ._sensors import AbstractSensor
+from ._structure import Structure
+from ._term import AbstractTerm, Parameter
+
+_ADDITIVE = 1e-6
+"""Departure from additivity in the force, relative, that is rounding."""
+_SYMMETRIC = 1e-6
+_PROBES = ((0.0, 0.0, 0.0), (0.1, 0.0, 0.5), (-0.2, 0.3, 1.0))
+"""Displacement, velocity and instant at which a function is tried."""
+
+
+class Simulation(Structure):
+    """A plant that is not made of masses, springs and dashpots: any function that JAX can trace.
+
+    Terms and sensors are added as to a structure. A term at (0, j) acts on coordinate j, one at (i, j) between two
+    coordinates.
+
+    Parameters
+    ----------
+    acceleration : callable
+        ``acceleration(q, v, force, t, p)`` gives the accelerations (dof,) at coordinates `q` (dof,), velocities `v`
+        (dof,), generalised forces `force` (dof,), and the instant `t` [s]. It is additive in the force, has no memory
+        and no jumps, and is written with ``jax.numpy``; `p` holds the numbers by name.
+    dof : int
+        Number of coordinates.
+    parameters : mapping of str to number, optional
+        Numbers of the function that a fit may change, each by the name under which it is found in `p`.
+    terms, sensors, trust
+        As of a `Structure`.
+
+    Raises
+    ------
+    TypeError
+        If `acceleration` cannot be called, or JAX cannot trace it.
+    ValueError
+        If it gives another shape than (dof,), a number that is not finite, something else at a second call, or is not
+        additive in the force; or if accelerations do not follow forces as those of masses do, by a symmetric matrix
+        that is positive definite.
+
+    Examples
+    --------
+    A pendulum of 1 kg on a rod of 0.5 m, in N m and rad:
+
+    >>> import jax; jax.config.update("jax_enable_x64", True)
+    >>> import jax.numpy as jnp, jfsm
+    >>> def pendulum(q, v, force, t, p):
+    ...     return (force - p["damping"] * v - 9.81 * 0.5 * jnp.sin(q)) / p["inertia"]
+    >>> model = jfsm.Simulation(pendulum, dof=1, parameters={"inertia": 0.25, "damping": 0.01})
+    >>> model = model + jfsm.Coulomb(0.05, at=(0, 1))
+    """
+
+    def __init__(
+        self,
+        acceleration: Acceleration,
+        dof: int,
+        parameters: Mapping[str, Any] | None = None,
+        terms: Iterable[AbstractTerm] = (),
+        sensors: Iterable[AbstractSensor] = (),
+        trust: Mapping[str, float] | Iterable[tuple[str, float]] = (),
+    ):
+        if not callable(acceleration):
+            raise TypeError(
+                "`acceleration` must be a function of (q, v, force, t, p) that gives accelerations; "
+                f"got {acceleration!r}."
+            )
+        if isinstance(dof, bool) or not isinstance(dof, int | np.integer) or dof < 1:
+            raise ValueError(f"`dof` must be the number of coordinates, at least 1; got {dof!r}.")
+        named = dict(parameters or {})
+        for name in named:
+            if not isinstance(name, str) or not name.isidentifier():
+                raise ValueError(f"`parameters` must have names such as length or k_2; got {name!r}.")
+        own = OwnMotion(acceleration, tuple(named))
+        values = [as_numbers(value, f"parameters {name}", 0) for name, value in named.items()]
+        numbers = jnp.stack([jnp.asarray(value) for value in values]) if values else jnp.zeros(0)
+        if is_traced(numbers):
+            mass = jnp.linalg.inv(own.answer(numbers, jnp.zeros(dof), jnp.zeros(dof), jnp.zeros(())))
+        else:
+            mass = np.linalg.inv(_checked(own, numbers, dof))
+            mass = (mass + mass.T) / 2
+        super().__init__(mass, terms, sensors, trust)
+        self.own, self.own_numbers = own, numbers
+
+    @property
+    def links(self) -> tuple[tuple[int, int], ...]:
+        """Places of laws: every coordinate, and where other terms act."""
+        joints = ((0, j) for j in range(1, self.dof + 1))
+        return tuple(dict.fromkeys([*joints, *(term.at for term in self.terms)]))
+
+    def having(self, *, terms: Any = None, sensors: Any = None, trust: Any = None) -> "Simulation":
+        return self._again(self.own_numbers, *(
+            mine if given is None else given
+            for given, mine in ((terms, self.terms), (sensors, self.sensors), (trust, self.trust))
+        ))  # fmt: skip
+
+    def save(self, path: Any) -> None:
+        """Refused: a function has no place in a TOML file."""
+        raise ValueError(
+            "A simulation moves by a function of yours and cannot be written as TOML; keep the Python file that makes "
+            "it. Its numbers are in `values()`."
+        )
+
+    def _again(self, numbers: Any, terms: Any, sensors: Any, trust: Any) -> "Simulation":
+        assert self.own is not None
+        return Simulation(
+            self.own.function, self.dof, dict(zip(self.own.names, numbers, strict=True)), terms, sensors, trust
+        )
+
+    def _own_entries(self) -> dict[str, tuple[Parameter, Float[Array, ""]]]:
+        names = self.own.names if self.own else ()
+        return {name: (Parameter(name), self.own_numbers[i]) for i, name in enumerate(names)}
+
+    def _with_own_values(self, values: list[Any], terms: list[Any], sensors: list[Any]) -> "Simulation":
+        numbers = [mine if new is None else new for mine, new in zip(self.own_numbers, values, strict=True)]
+        return self._again(numbers, terms, sensors, self.trust)
+
+
+def _checked(own: OwnMotion, numbers: Float[Array, " own"], dof: int) -> np.ndarray:
+    """Accelerations per unit of force at rest (dof, dof), of a function that keeps what is promised of it."""
+    rest, some, ask = jnp.zeros(dof), jnp.linspace(1.0, 2.0, dof), jax.jit(partial(OwnMotion.__call__, own))
+    try:
+        shape = jax.eval_shape(ask, numbers, rest, rest, rest, jnp.zeros(())).shape
+    except jax.errors.JAXTypeError as error:
+        raise TypeError(
+            "`acceleration` must be a function that JAX can trace: written with jax.numpy, with jnp.where in place of "
+            f"`if`. JAX says: {str(error).splitlines()[0]}"
+        ) from error
+    if shape != (dof,):
+        raise ValueError(
+            f"`acceleration` must give one acceleration per coordinate, shape ({dof},); it gives shape {shape}."
+        )
+    for x, v, t in _PROBES:
+        state = numbers, jnp.full(dof, x), jnp.full(dof, v)
+        free, pushed, twice, opposite = (
+            np.asarray(ask(*state, share * some, jnp.asarray(t))) for share in (0.0, 1.0, 2.0, -1.0)
+        )
+        if not np.all(np.isfinite([free, pushed, twice, opposite])):
+            raise ValueError(
+                f"`acceleration` must be finite; at q = {x:g}, v = {v:g}, t = {t:g} s it gives {pushed.tolist()}."
+            )
+        if not np.array_equal(free, np.asarray(ask(*state, rest, jnp.asarray(t)))):
+            raise ValueError("`acceleration` must give the same whenever it is asked the same; it has a memory.")
+        bend = max(np.max(np.abs(twice - 2 * pushed + free)), np.max(np.abs(pushed + opposite - 2 * free)))
+        if bend > _ADDITIVE * max(np.max(np.abs(pushed - free)), np.max(np.abs(free)), 1e-300):
+            raise ValueError(
+                "`acceleration` must be additive in `force`: a(f1 + f2) - a(f1) - a(f2) + a(0) = 0. It departs from "
+                f"that by {bend:.3g}. Friction and limits inside the function are better added as terms, for example "
+                "jfsm.Coulomb(F, at=(0, 1))."
+            )
+    return _answer(own, numbers, dof)
+
+
+def _answer(own: OwnMotion, numbers: Float[Array, " own"], dof: int) -> np.ndarray:
+    for x, v, t in reversed(_PROBES):
+        answer = np.asarray(own.answer(numbers, jnp.full(dof, x), jnp.full(dof, v), jnp.asarray(t)))
+        skew = np.max(np.abs(answer - answer.T))
+        if skew > _SYMMETRIC * np.max(np.abs(answer)) or np.min(np.linalg.eigvalsh((answer + answer.T) / 2)) <= 0:
+            raise ValueError(
+                "`acceleration` must answer forces as masses do, by a symmetric positive definite matrix; at "
+                f"q = {x:g} that of accelerations per unit of force is {answer.tolist()}. Forces are generalised: each "
+                "acts along its own coordinate."
+            )
+    return answer
