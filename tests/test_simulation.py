@@ -185,6 +185,7 @@ def asked(change, dof: int = 2):
         (asked(lambda a, q, v, f: a / q[0]), ValueError, "must be finite"),
         (asked(lambda a, q, v, f: a + f**3), ValueError, "must be additive in `force`"),
         (asked(lambda a, q, v, f: a + jnp.flip(f) * jnp.array([0.0, 0.5])), ValueError, "symmetric positive definite"),
+        (asked(lambda a, q, v, f: a + np.random.default_rng().normal()), ValueError, "whenever it is asked the same"),
         (asked(lambda a, q, v, f: a if float(q[0]) > 0 else -a), TypeError, "JAX can trace"),
     ],
 )

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -64,14 +65,15 @@ class Simulation(Structure):
 
     def __init__(
         self,
-        acceleration: Acceleration,
+        acceleration: Acceleration | OwnMotion,
         dof: int,
         parameters: Mapping[str, Any] | None = None,
         terms: Iterable[AbstractTerm] = (),
         sensors: Iterable[AbstractSensor] = (),
         trust: Mapping[str, float] | Iterable[tuple[str, float]] = (),
     ):
-        if not callable(acceleration):
+        tried = isinstance(acceleration, OwnMotion)
+        if not tried and not callable(acceleration):
             raise TypeError(
                 "`acceleration` must be a function of (q, v, force, t, p) that gives accelerations; "
                 f"got {acceleration!r}."
@@ -82,14 +84,13 @@ class Simulation(Structure):
         for name in named:
             if not isinstance(name, str) or not name.isidentifier():
                 raise ValueError(f"`parameters` must have names such as length or k_2; got {name!r}.")
-        own = OwnMotion(acceleration, tuple(named))
+        own = acceleration if tried else OwnMotion(acceleration, tuple(named))
         values = [as_numbers(value, f"parameters {name}", 0) for name, value in named.items()]
         numbers = jnp.stack([jnp.asarray(value) for value in values]) if values else jnp.zeros(0)
-        if is_traced(numbers):
-            mass = jnp.linalg.inv(own.answer(numbers, jnp.zeros(dof), jnp.zeros(dof), jnp.zeros(())))
-        else:
-            mass = np.linalg.inv(_checked(own, numbers, dof))
-            mass = (mass + mass.T) / 2
+        if not tried:
+            _try(own, numbers, dof)
+        mass = (jnp if is_traced(numbers) else np).linalg.inv(_answer(own, numbers, jnp.zeros(dof)))
+        mass = (mass + mass.T) / 2
         super().__init__(mass, terms, sensors, trust)
         self.own, self.own_numbers = own, numbers
 
@@ -113,10 +114,9 @@ class Simulation(Structure):
         )
 
     def _again(self, numbers: Any, terms: Any, sensors: Any, trust: Any) -> "Simulation":
+        """The same function, which was tried before."""
         assert self.own is not None
-        return Simulation(
-            self.own.function, self.dof, dict(zip(self.own.names, numbers, strict=True)), terms, sensors, trust
-        )
+        return Simulation(self.own, self.dof, dict(zip(self.own.names, numbers, strict=True)), terms, sensors, trust)
 
     def _own_entries(self) -> dict[str, tuple[Parameter, Float[Array, ""]]]:
         names = self.own.names if self.own else ()
@@ -127,8 +127,8 @@ class Simulation(Structure):
         return self._again(numbers, terms, sensors, self.trust)
 
 
-def _checked(own: OwnMotion, numbers: Float[Array, " own"], dof: int) -> np.ndarray:
-    """Accelerations per unit of force at rest (dof, dof), of a function that keeps what is promised of it."""
+def _try(own: OwnMotion, numbers: Float[Array, " own"], dof: int) -> None:
+    """Refuse a function that does not keep what is promised of it."""
     rest, some, ask = jnp.zeros(dof), jnp.linspace(1.0, 2.0, dof), jax.jit(partial(OwnMotion.__call__, own))
     try:
         shape = jax.eval_shape(ask, numbers, rest, rest, rest, jnp.zeros(())).shape
@@ -150,8 +150,9 @@ def _checked(own: OwnMotion, numbers: Float[Array, " own"], dof: int) -> np.ndar
             raise ValueError(
                 f"`acceleration` must be finite; at q = {x:g}, v = {v:g}, t = {t:g} s it gives {pushed.tolist()}."
             )
-        if not np.array_equal(free, np.asarray(ask(*state, rest, jnp.asarray(t)))):
-            raise ValueError("`acceleration` must give the same whenever it is asked the same; it has a memory.")
+        once, again = (np.asarray(own(*state, rest, jnp.asarray(t))) for _ in range(2))
+        if not np.array_equal(once, again):
+            raise ValueError("`acceleration` must give the same whenever it is asked the same; it does not.")
         bend = max(np.max(np.abs(twice - 2 * pushed + free)), np.max(np.abs(pushed + opposite - 2 * free)))
         if bend > _ADDITIVE * max(np.max(np.abs(pushed - free)), np.max(np.abs(free)), 1e-300):
             raise ValueError(
@@ -159,12 +160,7 @@ def _checked(own: OwnMotion, numbers: Float[Array, " own"], dof: int) -> np.ndar
                 f"that by {bend:.3g}. Friction and limits inside the function are better added as terms, for example "
                 "jfsm.Coulomb(F, at=(0, 1))."
             )
-    return _answer(own, numbers, dof)
-
-
-def _answer(own: OwnMotion, numbers: Float[Array, " own"], dof: int) -> np.ndarray:
-    for x, v, t in reversed(_PROBES):
-        answer = np.asarray(own.answer(numbers, jnp.full(dof, x), jnp.full(dof, v), jnp.asarray(t)))
+        answer = np.asarray(_answer(own, numbers, jnp.full(dof, x)))
         skew = np.max(np.abs(answer - answer.T))
         if skew > _SYMMETRIC * np.max(np.abs(answer)) or np.min(np.linalg.eigvalsh((answer + answer.T) / 2)) <= 0:
             raise ValueError(
@@ -172,4 +168,9 @@ def _answer(own: OwnMotion, numbers: Float[Array, " own"], dof: int) -> np.ndarr
                 f"q = {x:g} that of accelerations per unit of force is {answer.tolist()}. Forces are generalised: each "
                 "acts along its own coordinate."
             )
-    return answer
+
+
+@eqx.filter_jit
+def _answer(own: OwnMotion, numbers: Float[Array, " own"], q: Float[Array, " dof"]) -> Float[Array, "dof dof"]:
+    """Accelerations per unit of force of a plant that stands still."""
+    return own.answer(numbers, q, jnp.zeros_like(q), jnp.zeros(()))
