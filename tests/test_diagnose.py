@@ -395,9 +395,9 @@ def test_laws_of_a_class_share_one_program(believed, monkeypatch):
     original = _likelihood.tail_of
     monkeypatch.setattr(_likelihood, "tail_of", lambda *a: traced.append(1) or original(*a))
     _traced.clear_programs()
-    jfsm.diagnose(made(duffing, samples=400), believed, causes=FEW, key=jax.random.key(0))
+    jfsm.diagnose(made(duffing), believed, causes=FEW, key=jax.random.key(0))
     assert traced
-    jfsm.diagnose(made(duffing, samples=399, seed=5), believed, causes=FEW, key=jax.random.key(0))
+    jfsm.diagnose(made(duffing, samples=899, seed=5), believed, causes=FEW, key=jax.random.key(0))
     # One program with derivatives and one without, for smooth laws and for friction: for no other record, place, sign
     # or law. One without derivatives is made only once such a law is pursued.
     assert len(traced) <= 4

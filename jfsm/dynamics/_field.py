@@ -90,9 +90,9 @@ def autonomous_field(model: Structure, force: Any = None) -> Field:
             )
     plant = lower(model)
     if _depends_on_time(plant):
-        culprits = [_name(t) for t in model.terms if _depends_on_time(lower(Structure(model.mass, [t])))]
+        culprits = (_name(t) for t in model.terms if _depends_on_time(lower(Structure(model.mass, [t]))))
         raise ValueError(
-            f"`model` must not depend on time; the force of {[*culprits, 'its own function'][0]} does. "
+            f"`model` must not depend on time; the force of {next(culprits, 'its own function')} does. "
             "Leave it out with `model.without(term)`, or follow the motion with `jfsm.simulate`."
         )
     load = np.zeros(model.dof) if force is None else as_array(force, "force", (0, 1))

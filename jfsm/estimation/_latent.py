@@ -131,7 +131,7 @@ def latent_force(
     omega, length : float
         Angular frequency [rad/s] and size of the motion.
     """
-    n, dt = np.shape(values)[0], float(inputs.step)
+    n, dt, linear = np.shape(values)[0], float(inputs.step), linear_part(plant)
     padded = min(bucket(n), inputs.time.shape[0])  # nothing is read where it is filled up
     values, use = (np.pad(np.asarray(q), ((0, padded - n), (0, 0))) for q in (values, use))
     base = np.asarray(inputs.base)[:padded]
@@ -144,7 +144,7 @@ def latent_force(
     acceleration = np.array([kind == "acceleration" for kind in observation.kinds])
     seen = seen - base[:, :1] * acceleration
     arrays = np.asarray(force_covariance), np.asarray(variance), omega, length
-    make = partial(_model, plant, observation, dt, inputs.substeps, *arrays)
+    make = partial(_model, linear, observation, dt, inputs.substeps, *arrays)
     even = np.full(plant.dof, omega**2 * length)
     beliefs = [_Belief(tau / omega, share * even) for tau, share in product(_MEMORIES, _AMPLITUDES)]
     models = [make(*belief) for belief in beliefs]
@@ -186,7 +186,6 @@ def latent_force(
         if plant.laws
         else np.zeros_like(x)
     )
-    linear = linear_part(plant)
     a = (true[:, 0] - r - x @ np.asarray(linear.stiffness).T - v @ np.asarray(linear.damping).T) @ minv.T
     if plant.own is not None:
         along = jnp.asarray(x), jnp.asarray(v), jnp.asarray(a), inputs.time[:padded]
@@ -215,9 +214,9 @@ def _model(
     plant: Plant, observation: Observation, dt, substeps, force_covariance, variance, omega, length, tau, amplitude
 ) -> _Model:
     dof = plant.dof
-    minv, linear = np.linalg.inv(np.asarray(plant.mass)), linear_part(plant)
+    minv = np.linalg.inv(np.asarray(plant.mass))
     zero, eye = np.zeros((dof, dof)), np.eye(dof)
-    k, c = np.asarray(linear.stiffness), np.asarray(linear.damping)
+    k, c = np.asarray(plant.stiffness), np.asarray(plant.damping)
     rate = np.block([[zero, eye, zero], [-minv @ k, -minv @ c, -minv], [zero, zero, -eye / tau]])
     gain = np.concatenate([zero, minv, zero])
     n = 3 * dof

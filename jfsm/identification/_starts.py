@@ -78,7 +78,8 @@ def _measured(plant: Plant, nuisances: Nuisances, values: np.ndarray, use: np.nd
         lacking = (values[:, i] - known[:, j]) / (1.0 + float(plant.force_gain[j]))
         left[:, j] = np.interp(np.arange(n), np.flatnonzero(seen), lacking[seen])
         std[:, j] = nuisances.floor[i]
-    x, v, a = (np.asarray(q)[:n, 0] for q in (imposed.x, imposed.v, imposed.a))
+    x, v = (np.asarray(q)[:n, 0] for q in (imposed.x, imposed.v))
+    a = np.asarray(imposed.a)[:n]
     return Latent(x, v, a, left, std, np.ones(n, bool))
 
 

@@ -67,8 +67,9 @@ def looked_at(records: Sequence[Record], model: Structure) -> Looked:
     _stop_at(checks, records)
     _stop_at_motion(inverted, checks)
     sound = [_sound(record, one, inverted) for record, one in zip(records, looks, strict=True)]
-    linear = model.own is None  # what a simulation makes of a force is not asked of its linear part
-    asked = tuple(chain.from_iterable(beside_model(record, model) for record in sound if linear))
+    if model.own is not None:  # what a simulation makes of a force is not asked of its linear part
+        return Looked(sound, checks, inverted)
+    asked = tuple(chain.from_iterable(beside_model(record, model) for record in sound))
     _stop_at(asked, records)
     opposed = _opposed(asked)
     return Looked([_turned(record, opposed) for record in sound], (*checks, *asked), (*inverted, *opposed))
