@@ -137,7 +137,11 @@ def fit(
 @takes_record
 def diagnose(
     source: RecordFiles,
-    model: ModelFile,
+    model: Annotated[Path | None, option("The model that is believed, as TOML; without it, give --simulated.")] = None,
+    simulated: Annotated[
+        Path | None,
+        option("Output of a simulation that is no TOML: its run, channels called as in the record.", "FILE"),
+    ] = None,
     holdout: Annotated[
         list[str] | None,
         option(
@@ -167,9 +171,14 @@ def diagnose(
     """
     from ..diagnosis import diagnose
 
-    inputs = [*source.records, model, *(Path(text) for text in holdout or ())]
+    if model is None and simulated is None:
+        raise ValueError("--model or --simulated must be given: what the simulation is, or what it makes of the test.")
+    given = [path for path in (model, simulated) if path is not None]
+    inputs = [*source.records, *given, *(Path(text) for text in holdout or ())]
     check_outputs({"--report": report, "--json": json, "--extended": extended}, inputs)
-    records, held, believed = source.read(), source.held_out(holdout), load(model)
+    records, held = source.read(), source.held_out(holdout)
+    believed = None if model is None else load(model)
+    run = None if simulated is None else source.read_simulated(simulated)
     units = shown_units(out_units, records[0])
     with progress() as tell:
         d = diagnose(
@@ -179,6 +188,7 @@ def diagnose(
             causes=cause,
             max_causes=max_causes,
             key=random_key(key),
+            simulated=run,
             time_limit=time_limit,
             progress=tell,
         )

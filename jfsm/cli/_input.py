@@ -4,11 +4,11 @@ import functools
 import re
 import shlex
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from inspect import Parameter, signature
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import typer
 
@@ -115,6 +115,31 @@ class _Channels:
         if self.every is not None:
             return record.resample(_slower(self.every, self.resample, record))
         return record if self.resample is None else record.resample(_rate(self.resample, record))
+
+    def read_simulated(self, path: Path) -> "Record":
+        """The output of a simulation in a file, which may leave out what drove it."""
+        try:
+            return self.read_file(path, cut=True)
+        except ValueError:
+            answer = self._without_drive()
+            if answer == self:
+                raise
+            try:
+                return answer.read_file(path, cut=True)
+            except ValueError:
+                pass
+            raise
+
+    def _without_drive(self) -> Self:
+        """The channels but for forces and the base, and but for what is said of these."""
+        driving = {name.rpartition("=")[2] for name in [*(self.force or ()), self.base_acceleration or ""]}
+
+        def others(given: list[str] | None) -> list[str] | None:
+            return [text for text in given or () if text.partition("=")[0] not in driving] or None
+
+        return replace(
+            self, force=None, base_acceleration=None, unit=others(self.unit), sensitivity=others(self.sensitivity)
+        )
 
     def listing(self, path: Path) -> "Listing | None":
         """What a file holds of which nothing was asked for and which does not say itself what is what; else None."""

@@ -12,39 +12,19 @@ from .._types import require_x64
 from ..plant import Reconstruction
 from ..records import Record
 from ..reporting import shown_by_default
-from ..structures import AbstractTerm, Cause, Structure
+from ..structures import Cause, Runs, Structure
+from ._conduct import conduct
 from ._diagnosis import Diagnosis
-from .advice.detection_limits import Silence, Smallest, detectable, naturally_detectable
-from .advice.next_test import Leading
-from .channels.clipping import limited
-from .channels.delays import Late, in_time, slightly_late
-from .channels.drift import steadied
-from .evidence.fitted import Trial
-from .evidence.measured import HeldOutRuns, Weighed
-from .evidence.missing_force import Residual, residual
-from .evidence.setup import Problem
-from .evidence.split import HeldOut, records_of, split
-from .hypotheses.candidate import Candidate
-from .hypotheses.candidates import chosen_causes
-from .look.in_verdict import mended_model
-from .look.looked import held_out_alike, looked_at
-from .report.assemble import Reached, Tested, assemble
-from .report.sentences import leaves_something
-from .report.unfinished import Unfinished
-from .search.rounds import Searched
+from ._stand_in import departure, driven_alike, stand_in
+from .evidence.split import records_of
 from .search.steps import Progress, Steps
-from .search.study import Study
-from .verdict.judge import judge_in_sign
-
-_ROUNDS = 3
-"""Times that a record is looked into, at most, in which channels turn out to be late by less than a sample."""
 
 
 @programs_kept()
 @small_matrices()
 def diagnose(
     record: Record | Sequence[Record],
-    model: Structure,
+    model: Structure | Runs | None = None,
     holdout: float | Record | Sequence[Record] | None = 0.3,
     causes: Sequence[str | Cause] | None = None,
     max_causes: int = 2,
@@ -54,6 +34,7 @@ def diagnose(
     until: float | None = None,
     places: Sequence[tuple[int, int]] | None = None,
     reconstruction: Reconstruction | None = None,
+    simulated: Record | Sequence[Record] | None = None,
     time_limit: float | None = None,
     progress: Progress | bool | None = None,
 ) -> Diagnosis:
@@ -73,8 +54,9 @@ def diagnose(
     ----------
     record : Record or sequence of them
         One verdict that must hold on all.
-    model : Structure
+    model : Structure or Simulation.from_runs(...), optional
         The simulation that its owner believes in. Its own values are refitted within its trust (`Structure.uncertain`).
+        One that can only be run is run under what drives every record, and a structure found that stands for it.
     holdout : float, Record, sequence of Records, or None
         A share is the last part in time, unless what the model lacks shows only there: then it is the first. Where
         nothing drives the structure it is the last part of what is more than noise, run from the release. Records are
@@ -94,6 +76,11 @@ def diagnose(
     reconstruction : "band-limited", "linear" or "hold", optional
         The force between its samples. By default band-limited, as whatever was filtered before it was sampled, unless
         another one turns out far likelier.
+    simulated : Record or sequence of Records, optional
+        Runs of a simulation of which there is nothing but the output: the motion under the record's force, on its
+        clock, or under any other force that they hold as well. A structure that follows them stands for the simulation.
+        `model` need not be given then; if it is, it says which masses and links the simulation has, and its values need
+        not be right.
     time_limit : float, optional
         Seconds after which the best verdict so far is given, marked as unfinished. The first interrupt (Ctrl-C) does
         the same; a second one stops everything.
@@ -127,100 +114,47 @@ def diagnose(
         raise ValueError(f"`time_limit` must be positive, in seconds; got {time_limit:g}. Without it there is none.")
     limit = Limit(time_limit)
     records = [part.between(since, until) for part in records_of(record)]
-    with shown_by_default(progress) as told, ended_by_interrupt(limit):
-        arguments = records, model, holdout, causes, max_causes, key, places, reconstruction
-        return _diagnosed(*arguments, limit, Steps(told, 4))
-
-
-def _diagnosed(
-    given: Sequence[Record],
-    model: Structure,
-    holdout: float | Record | Sequence[Record] | None,
-    causes: Sequence[str | Cause] | None,
-    max_causes: int,
-    key: jax.Array | None,
-    places: Sequence[tuple[int, int]] | None,
-    reconstruction: Reconstruction | None,
-    limit: Limit,
-    steps: Steps,
-) -> Diagnosis:
-    """What `diagnose` returns, within the limit."""
     key = jax.random.key(secrets.randbits(32)) if key is None else key
-    looked = looked_at(given, model)
-    record, holdout = looked.records, held_out_alike(holdout, looked)
-    training, _ = split(record, holdout)
-    chosen = chosen_causes(causes)
-    whole = [whole for whole, _ in training]
-    clipped = limited(whole, model) if "clipping" in chosen else []
-    stated = model
-    for sensor in clipped:
-        model = model + sensor
-
-    steps.next("the model as given and refitted")
-    study = Study(model, chosen, places, reconstruction, key, steps, limit, pairs=max_causes > 1)
-    problem, every, found, held, late = _looked_into(record, holdout, study)
-    steps.next("the verdict, and its gain on held-out readings")
-    assumed = study.ways[0]
-    weighed = Weighed(
-        found, problem, clipped, HeldOutRuns(stated, model, held, key, assumed), looked.checks, looked.inverted
-    )
-    decision = judge_in_sign(weighed.evidence)
-    behind = weighed.behind(decision)
-    judged, tried, winner = behind.problem, behind.found, behind.trial(decision.winner)
-    late_forces, (gain, runs) = behind.late(decision), behind.gain(decision)
-    extended = behind.extended(decision, {**late, **{channel: tau[0] for channel, tau in late_forces.items()}})
-    steps.next("the missing force")
-    term = next(iter(winner.laws), None) if decision.verdict == "cause" else None
-    first, fitted, refitted = judged.first, judged.until[0], tried.refitted
-    missing = _stands_for(term, winner, refitted, judged)
-    rest = residual(winner.structure, steadied(first), fitted) if leaves_something(decision, winner) else None
-    steps.next("what would have been seen")
-    seen = _would_have_been_seen(decision.verdict, every, tried, judged)
-    extended = mended_model(extended, looked)
-    unfinished = Unfinished.of(chosen, tried, limit, cut=not decision.finished, pairs=study.pairs)
-    tested = Tested(tried.trials, tried.behind, tried.left_out, seen, tried.lack.known, unfinished)
-    leading = Leading.of(model, [refitted, *tried.trials], lambda t: decision.probability(t.key), first, fitted)
-    steps.end()
-    reached = Reached(decision, winner, term, weighed.evidence, rest, assumed, late_forces)
-    return assemble(reached, clipped, refitted, tested, judged, extended, missing, gain, runs, leading, looked)
+    runs = _runs(records, model, simulated)
+    with shown_by_default(progress) as told, ended_by_interrupt(limit):
+        steps = Steps(told, 4 + bool(runs))
+        if runs:
+            steps.next("what the simulation does")
+            tell = steps.of("what the simulation does")
+            form = model if isinstance(model, Structure) else None
+            found = stand_in(runs, form, key, limit, lambda what, done, total: tell(what, total - done))
+            said = [found.words, *filter(None, map(departure, runs, records))]
+            records, model = [part.noted(*said) for part in records], found.structure
+        assert isinstance(model, Structure)
+        d = conduct(records, model, holdout, causes, max_causes, key, places, reconstruction, limit, steps)
+        steps.end()
+    return d
 
 
-def _stands_for(term: AbstractTerm | None, winner: Trial, refitted: Trial, problem: Problem) -> Residual:
-    """The force that a law stands for, with the own values that go with it; without a law, what the refit lacks."""
-    lacking = refitted.structure if term is None else winner.structure.without(term)
-    at = term.at if term is not None and term.at in lacking.links else None
-    return residual(lacking, steadied(problem.first), problem.until[0], at)
+def _runs(
+    records: Sequence[Record], model: Structure | Runs | None, simulated: Record | Sequence[Record] | None
+) -> list[Record]:
+    """Runs of the simulation where nothing else is known of it, with what drove them; none where it is a structure.
 
-
-def _would_have_been_seen(verdict: str, every: list[Candidate], found: Searched, problem: Problem) -> list[Smallest]:
-    """The smallest effects that would have shown: of every candidate where none was named, since silence is worth what
-    would have been heard."""
-    silence = Silence(found.given, found.refitted, problem)
-    if verdict in ("consistent", "undecided"):
-        return naturally_detectable(every, silence)
-    return detectable(found.trials, silence)
-
-
-def _looked_into(
-    record: Record | Sequence[Record], holdout: float | Record | Sequence[Record] | None, study: Study
-) -> tuple[Problem, list[Candidate], Searched, list[HeldOut], Late]:
-    """What a study makes of the records, and what is held out, with channels in time that are late by less than a
-    sample."""
-    late: Late = {}
-    reached = None
-    for _ in range(_ROUNDS):
-        training, held = in_time(*split(record, holdout), late)
-        studied = study.of(training, unless_later=isinstance(holdout, float))
-        if isinstance(studied, Trial):  # as much is kept back of the first part
-            training, held = in_time(*split(record, holdout, first=True), late)
-            studied = study.of(training, known=studied)
-            assert not isinstance(studied, Trial)
-        if reached is not None and study.limit.over:  # what was found before is not worth less
-            break
-        problem, every, found = studied
-        reached = problem, every, found, held, late
-        late = slightly_late(found.every, late, problem.first.record)
-        if late == reached[-1] or study.limit.over:
-            break
-    assert reached is not None
-    return reached
+    Raises
+    ------
+    TypeError, ValueError
+        If the model is none, or there is neither a model nor a run.
+    """
+    if isinstance(model, Runs):
+        if simulated is not None:
+            raise ValueError("`simulated` must be left out where `model` makes runs itself.")
+        return [model.tried_on(record) for record in records]
+    if model is not None and not isinstance(model, Structure):
+        raise TypeError(
+            f"`model` must be a structure, such as jfsm.Structure.sdof(1.0, 9.0, 0.1), or a simulation; got {model!r}."
+        )
+    if simulated is not None:
+        runs = records_of(simulated)
+        return [driven_alike(run, records[min(i, len(records) - 1)]) for i, run in enumerate(runs)]
+    if model is None:
+        raise ValueError(
+            "`model` must be the simulation that you believe in, such as jfsm.Structure.sdof(1.0, 9.0, 0.1); where you "
+            "have nothing but its output, give that: simulated=run."
+        )
+    return []

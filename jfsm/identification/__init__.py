@@ -25,6 +25,7 @@ from ._posterior import Posterior as Posterior
 from ._posterior import beginnings as beginnings
 from ._posterior import lanes_of as lanes_of
 from ._posterior import prior as prior
+from ._rough_model import rough_model as rough_model
 from ._starts import Placed as Placed
 from ._starts import about_a_rest as about_a_rest
 from ._starts import forces_of as forces_of

@@ -99,11 +99,20 @@ def plant_rows(
 
 @lru_cache(maxsize=512)
 def _rows(layout: _Layout, paths: tuple[str, ...], channels: tuple[Channel, ...], slots) -> np.ndarray:
-    """As the plant is linear in each number, doubling it shows its row exactly."""
+    """As the plant is linear in each number, doubling it shows its row exactly.
+
+    A number of the plant's own function stands in the vector as it is; the mass at rest that goes with it stays.
+    """
     structure, how = layout.structure, dict(slots)
-    base, values = plant_vector(numbers_of(structure, channels, **how)), structure.values()
+    numbers = numbers_of(structure, channels, **how)
+    base, values = plant_vector(numbers), structure.values()
     rows = []
     for path in paths:
+        if structure.own is not None and path in structure.own.names:
+            row = np.zeros(base.size)
+            row[place_of(numbers, "own_numbers").start + structure.own.names.index(path)] = 1.0
+            rows.append(row)
+            continue
         value = values[path]
         step = value if value != 0 else 1.0
         doubled = numbers_of(structure.with_values({path: value + step}), channels, **how)

@@ -1,6 +1,6 @@
 """A simulation of the user's own: a function that answers a force with an acceleration."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Any
 
@@ -11,7 +11,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._types import as_numbers, is_traced
+from ..records import Record
 from ._own_motion import Acceleration, OwnMotion
+from ._runs import Runs
 from ._sensors import AbstractSensor
 from ._structure import Structure
 from ._term import AbstractTerm, Parameter
@@ -93,6 +95,25 @@ class Simulation(Structure):
         mass = (mass + mass.T) / 2
         super().__init__(mass, terms, sensors, trust)
         self.own, self.own_numbers = own, numbers
+
+    @staticmethod
+    def from_runs(run: Callable[[Record], Any]) -> Runs:
+        """A simulation that can only be run, for `diagnose`, which finds a structure that stands for it.
+
+        Parameters
+        ----------
+        run : callable
+            ``run(record)`` gives the motion that the simulation makes of what drives the record: a `Record`, a
+            `Response`, or a mapping of ``"displacement"``, ``"velocity"`` or ``"acceleration"`` to (n,) or (n, dof)
+            arrays on the record's clock. It repeats itself, and does not know the force before it acts.
+
+        Examples
+        --------
+        >>> def run(record):
+        ...     return {"displacement": my_code(record.time, record.force)}
+        >>> d = jfsm.diagnose(record, jfsm.Simulation.from_runs(run))
+        """
+        return Runs(run)
 
     @property
     def links(self) -> tuple[tuple[int, int], ...]:
