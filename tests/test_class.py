@@ -3,7 +3,7 @@
 import pytest
 
 import jfsm
-from jfsm.diagnosis._diagnosis import Finding, Rival
+from jfsm.diagnosis._finding import Finding, Rival
 from jfsm.diagnosis.hypotheses.law_classes import classes_of
 from jfsm.diagnosis.report.sentences import finding_sentence
 

@@ -144,6 +144,23 @@ def test_a_notebook_shows_the_verdict_in_a_line(hidden_cubic):
     assert repr(hidden_cubic) == f"<Diagnosis, cause: {hidden_cubic.sentence}>"
 
 
+def test_a_diagnosis_is_read_back_from_its_json(hidden_cubic, tmp_path):
+    hidden_cubic.to_json(tmp_path / "d.json")
+    again = jfsm.Diagnosis.load(tmp_path / "d.json")
+    for name in ("verdict", "findings", "refitted", "detectable", "noise", "notes", "sentence", "modes", "finished"):
+        assert getattr(again, name) == getattr(hidden_cubic, name), name
+    assert [(c.cause, c.at, c.why) for c in again.candidates] == [
+        (c.cause, c.at, c.why) for c in hidden_cubic.candidates
+    ]
+    assert again.gain.closed == hidden_cubic.gain.closed and again.gain.channels == hidden_cubic.gain.channels
+    assert again.extended.values() == pytest.approx(hidden_cubic.extended.values(), rel=1e-12)
+    assert again.why() == hidden_cubic.why() and repr(again) == repr(hidden_cubic)
+    again.report(tmp_path / "again.html")
+    hidden_cubic.report(tmp_path / "first.html")
+    assert (tmp_path / "again.html").read_text() == (tmp_path / "first.html").read_text()
+    assert again.next_tests() == []
+
+
 def test_the_verdict_is_written_as_json_and_as_a_page(hidden_cubic, tmp_path):
     hidden_cubic.to_json(tmp_path / "d.json")
     hidden_cubic.report(tmp_path / "d.html")

@@ -208,6 +208,14 @@ def test_a_file_gives_the_structure_back_exactly(tmp_path):
     ]
 
 
+def test_a_structure_is_a_text_as_it_is_a_file_unless_it_has_a_map(tmp_path):
+    full().save(tmp_path / "model.toml")
+    assert full().to_toml() == (tmp_path / "model.toml").read_text()
+    assert jfsm.Structure.from_toml(full().to_toml()).values() == full().values()
+    with pytest.raises(ValueError, match="A structure with a map, at 0-1, needs files"):
+        (full() + learned().on((0, 1))).to_toml()
+
+
 def test_a_file_keeps_a_mass_matrix(tmp_path):
     jfsm.Structure([[2.0, 0.5], [0.5, 1.0]]).save(tmp_path / "model.toml")
     assert np.array_equal(jfsm.Structure.load(tmp_path / "model.toml").mass, [[2.0, 0.5], [0.5, 1.0]])

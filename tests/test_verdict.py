@@ -280,6 +280,23 @@ def test_of_laws_alike_the_one_whose_shape_is_right_is_named(nats: float, named:
 
 
 @pytest.mark.parametrize(
+    ("causes", "places", "verdict"),
+    [
+        (("coulomb", "coulomb"), ((0, 1), (1, 2)), "cause"),
+        (("coulomb", "jenkins"), ((0, 1), (1, 2)), "cause"),  # dry friction in either joint
+        (("coulomb", "cubic_hardening"), ((0, 1), (1, 2)), "undecided"),
+        (("coulomb", "jenkins"), ((0, 1), (0, 1)), "undecided"),
+    ],
+)
+def test_two_laws_must_leave_white_innovations_unless_they_are_of_one_kind_at_two_places(causes, places, verdict):
+    effects = [Effect(CAUSES[cause], at) for cause, at in zip(causes, places, strict=True)]
+    found = card(9000.0, 0.002, *causes, whiteness=0.4)
+    cards = tuple(one._replace(at=at) for one, at in zip(found.effects, places, strict=True))
+    found = replace(found, key=key_of(effects), effects=cards)
+    assert judged(found).verdict == verdict
+
+
+@pytest.mark.parametrize(
     ("left", "whiteness", "second", "mapped", "near"),
     [
         (0.002, 0.4, (), None, True),

@@ -1,9 +1,9 @@
 """What is wrong: candidates, evidence, verdict, gain."""
 
+from .._result import Estimate as Estimate
 from ._diagnose import diagnose as diagnose
 from ._diagnosis import Diagnosis as Diagnosis
-from ._diagnosis import Estimate as Estimate
-from ._diagnosis import Finding as Finding
+from ._finding import Finding as Finding
 from .advice.next_test import Proposal as Proposal
 from .evidence.evidence import Evidence as Evidence
 from .thresholds import Thresholds as Thresholds

@@ -1,7 +1,7 @@
 """The outcome of a diagnosis, as a value."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -11,107 +11,12 @@ import jax
 from .._result import Estimate
 from ..identification import Mode
 from ..records import OutUnits, out_units
-from ..structures import Cause, Structure, causes
+from ..structures import Structure, causes
+from ._finding import CandidateResult, Finding
 from .advice.next_test import Leading, Proposal, proposals
 from .evidence.free_runs import Gain
+from .report.read_back import fields_of
 from .verdict.decision import Decision, Explanation
-
-FOUND = 0.99
-"""Probability of a sensor's fault that shows without a search: far beyond noise, and yet a record may lie."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One named cause, or one own value that is wrong.
-
-    Attributes
-    ----------
-    cause, family : str
-        Id of the cause, and of its family.
-    at : tuple
-        Its place: a link (i, j), or a channel.
-    probability : float
-        Of the cause, with or without other effects.
-    parameters : dict
-        Its numbers.
-    rivals : tuple of Rival
-        Causes that may stand in its place.
-    sentence : str
-    kind : str
-        The narrowest class of laws that is sure to act there, in words.
-    kind_probability : float
-        Of the class.
-    law_open : bool
-        Whether the class is sure and the law is not: then `cause` is the most probable of its `members`.
-    members : dict
-        Probability of every cause of the class that has a chance.
-    size : Estimate or None
-        What all members share: friction [N] by the energy that it takes over the way, the damping or the stiffness that
-        is added, or the rms of the force, along the motion that was measured. The interval holds that of every member.
-    """
-
-    cause: str
-    family: str
-    at: tuple
-    probability: float
-    parameters: dict[str, Estimate]
-    rivals: tuple["Rival", ...] = ()
-    sentence: str = ""
-    kind: str = ""
-    kind_probability: float = 0.0
-    law_open: bool = False
-    members: dict[str, float] = field(default_factory=dict)
-    size: Estimate | None = None
-
-    @classmethod
-    def of_sensor(
-        cls,
-        cause: Cause,
-        at: tuple,
-        name: str,
-        size: Estimate,
-        sentence: str,
-        kind: str,
-        rivals: tuple["Rival", ...] = (),
-    ) -> "Finding":
-        """A sensor's fault that was found without a search: its one number by name, and what class it is of."""
-        return cls(
-            cause.id, cause.family, at, FOUND, {name: size}, rivals, sentence, kind, FOUND,
-            members={cause.id: FOUND}, size=size,
-        )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Rival:
-    """Another cause that this record cannot rule out."""
-
-    cause: str
-    at: tuple
-    probability: float
-
-
-@dataclass(frozen=True)
-class CandidateResult:
-    """A candidate that was tried.
-
-    `evidence` counts in nats from the refitted model, `error` is its multi-step prediction error per set as a share of
-    the signal, `kappa` the smallest share of the refit's excess power that it explains, `why` the reason in words.
-    Of one that was fitted, `left` is what it leaves beyond noise and chance, as a share of the signal, `whiteness` the
-    largest lag-one correlation of its innovations, and `unfit` the nats that forces of other shapes would gain beside
-    it, where that was asked.
-    """
-
-    cause: str
-    at: tuple
-    evidence: float
-    error: dict[str, float]
-    kappa: float
-    probability: float
-    parameters: dict[str, Estimate]
-    why: str
-    left: float | None = None
-    whiteness: float | None = None
-    unfit: float | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -220,3 +125,21 @@ class Diagnosis:
         from ..reporting import write_text_atomically
 
         write_text_atomically(Path(path), json.dumps(self.data, indent=1, allow_nan=False))
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Diagnosis":
+        """A diagnosis from what `to_json` wrote.
+
+        What needs the record is not in it: there are no `next_tests`, and `extended` is None where it holds a map or a
+        function, which JSON has no place for.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be read.
+        ValueError
+            If it does not hold the numbers of a diagnosis, is cut short, or another version wrote it.
+        """
+        from ..reporting import read_diagnosis
+
+        return cls(**fields_of(read_diagnosis(path)))

@@ -156,15 +156,8 @@ def driven_alike(simulated: Record, record: Record) -> Record:
     ValueError
         If their clocks differ, or they are in units of different kinds.
     """
-    shared = {kind for kind, _ in simulated.channels} & {kind for kind, _ in record.channels}
-    for kind in sorted(shared):
-        if simulated.units[kind] != record.units[kind]:
-            raise ValueError(
-                f"`simulated` must be in the units of the record; its {kind} is in {simulated.units[kind]}, that of "
-                f"the record in {record.units[kind]}. State the units of both."
-            )
-    forces = {dof: y for (kind, dof), y in record.channels.items() if kind == "force"}
-    if simulated.driven or not (forces or record.base_acceleration is not None):
+    _check_units(simulated, record)
+    if simulated.driven or not record.driven:
         return simulated
     if not on_one_clock(simulated, record):
         raise ValueError(
@@ -172,13 +165,27 @@ def driven_alike(simulated: Record, record: Record) -> Record:
             "taken: give it a force channel, or the same instants as the record."
         )
     columns: dict[str, Any] = {}
-    for kind, dof in simulated.responses:
-        columns[kind] = {**columns.get(kind, {}), dof: np.asarray(simulated.channels[kind, dof])}
-    units = {kind: simulated.units[kind] for kind in columns} | {"force": record.units["force"]}
+    for (kind, dof), samples in (*_forces(record), *simulated.responses.items()):
+        columns.setdefault(kind, {})[dof] = np.asarray(samples)
+    units = {kind: (record if kind == "force" else simulated).units[kind] for kind in columns}
     return Record(
-        record.time, force=forces or None, base_acceleration=record.base_acceleration, units=units,
-        at_rest=simulated.at_rest, drive=record.drive, name=simulated.name, **columns,
+        record.time, base_acceleration=record.base_acceleration, units=units, at_rest=simulated.at_rest,
+        drive=record.drive, name=simulated.name, **columns,
     )  # fmt: skip
+
+
+def _forces(record: Record) -> list[tuple[tuple[str, int], Any]]:
+    return [(channel, samples) for channel, samples in record.channels.items() if channel[0] == "force"]
+
+
+def _check_units(simulated: Record, record: Record) -> None:
+    """Refuse a run in other units than the record, where both hold a kind of channel."""
+    for kind in sorted({kind for kind, _ in simulated.channels} & {kind for kind, _ in record.channels}):
+        if simulated.units[kind] != record.units[kind]:
+            raise ValueError(
+                f"`simulated` must be in the units of the record; its {kind} is in {simulated.units[kind]}, that of "
+                f"the record in {record.units[kind]}. State the units of both."
+            )
 
 
 def on_one_clock(one: Record, other: Record) -> bool:

@@ -129,6 +129,10 @@ class Simulation(Structure):
 
     def save(self, path: Any) -> None:
         """Refused: a function has no place in a TOML file."""
+        self.to_toml()
+
+    def to_toml(self) -> str:
+        """Refused: a function has no place in a TOML file."""
         raise ValueError(
             "A simulation moves by a function of yours and cannot be written as TOML; keep the Python file that makes "
             "it. Its numbers are in `values()`."

@@ -285,6 +285,25 @@ class Structure(eqx.Module):
 
         save(self, path)
 
+    def to_toml(self) -> str:
+        """What `save` writes, as text.
+
+        Raises
+        ------
+        ValueError
+            If it holds a map or a function, which need more than a text.
+        """
+        from ._toml import dumps
+
+        return dumps(self)
+
+    @classmethod
+    def from_toml(cls, text: str) -> "Structure":
+        """The structure that a text of `to_toml` is of."""
+        from ._toml import loads
+
+        return loads(text, Path("text"))
+
     @classmethod
     def load(cls, path: str | Path) -> "Structure":
         """Read a structure that `save` wrote, or one written by hand."""

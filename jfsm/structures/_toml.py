@@ -3,6 +3,7 @@
 import io
 import os
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +29,33 @@ def save(structure: "Structure", path: str | Path) -> None:
     """
     target = Path(path)
     maps: dict[str | os.PathLike[str], bytes] = {}
+
+    def beside(term: MapTerm) -> str:
+        place = target.with_name(f"{target.stem}.map{len(maps) + 1 if maps else ''}.npz")
+        maps[place] = _written(term)
+        return place.name
+
+    text = _text(structure, beside)
+    write_atomically({**maps, target: text.encode()})
+
+
+def dumps(structure: "Structure") -> str:
+    """The text of the file of a structure without maps.
+
+    Raises
+    ------
+    ValueError
+        If a term holds a map, whose numbers need a file of their own.
+    """
+
+    def nowhere(term: MapTerm) -> str:
+        raise ValueError(f"A structure with a map, at {term.place}, needs files: Structure.save(path) writes them.")
+
+    return _text(structure, nowhere)
+
+
+def _text(structure: "Structure", beside: Callable[[MapTerm], str]) -> str:
+    """The TOML of a structure; `beside` gives the name of the file that holds a map."""
     data: dict[str, Any] = {"mass": np.asarray(structure.mass).tolist()}
     if structure.trust:
         data["uncertain"] = dict(structure.trust)
@@ -36,16 +64,14 @@ def save(structure: "Structure", path: str | Path) -> None:
         for part in parts:
             row = {"kind": part.kind, "at": list(part.at)}
             if isinstance(part, MapTerm):
-                beside = target.with_name(f"{target.stem}.map{len(maps) + 1 if maps else ''}.npz")
-                maps[beside] = _written(part)
-                rows.append({**row, "file": beside.name})
+                rows.append({**row, "file": beside(part)})
             elif part.parameters:
                 rows.append({**row, **{p.name: float(getattr(part, p.name)) for p in part.parameters}})
             else:
                 raise ValueError(f"A structure with a {part.kind} cannot be written as TOML: it has no numbers.")
         if rows:
             data[key] = rows
-    write_atomically({**maps, target: tomli_w.dumps(data).encode()})
+    return tomli_w.dumps(data)
 
 
 def _written(term: MapTerm) -> bytes:
@@ -71,14 +97,29 @@ def load(path: str | Path) -> "Structure":
         If the file is not TOML, lacks `mass`, or holds an unknown kind or parameter, a value that cannot be, or a file
         that is no map; names the entry.
     """
-    from ._structure import Structure
-
     target = Path(path)
     if not target.is_file():
         raise FileNotFoundError(f"There is no model file {target}; write one with `Structure.save(path)`.")
     try:
-        data = tomllib.loads(target.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        text = target.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{target} is not a TOML file: {error}.") from None
+    return loads(text, target)
+
+
+def loads(text: str, target: Path) -> "Structure":
+    """The structure in the text of a file `target`, beside which its maps are.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        As of `load`.
+    """
+    from ._structure import Structure
+
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
         raise ValueError(f"{target} is not a TOML file: {error}.") from None
     unknown = set(data) - {"mass", "term", "sensor", "uncertain"}
     if unknown:

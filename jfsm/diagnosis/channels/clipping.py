@@ -4,10 +4,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ..._result import Estimate
 from ...identification import LEAST_SAMPLES
 from ...records import Record, defects
 from ...structures import Clipping, Structure, causes
-from .._diagnosis import Estimate, Finding
+from .._finding import Finding
 from ..hypotheses.law_classes import SENSOR
 
 _NOTICEABLE = 0.002

@@ -1,7 +1,9 @@
 """Values as JSON has them."""
 
 import math
-from typing import Any
+from functools import partial
+from types import UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -20,6 +22,35 @@ def as_plain(value: Any, *, lossless: bool = True) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return str(value) if lossless else None
     return value
+
+
+def made_of(kind: Any, written: Any) -> Any:
+    """What `as_plain` was made of: dataclasses and named tuples by their annotations, tuples, dictionaries, numbers.
+
+    A number that JSON does not have, written as None, is not a number. Of a bare tuple, as a place is one, lists are
+    tuples.
+    """
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin in (Union, UnionType):  # something or None
+        return written if written is None else made_of(inner[0], written)
+    if kind is float:
+        return float("nan" if written is None else written)
+    if kind is tuple:
+        return _tuples(written)
+    if origin is tuple:
+        return tuple(map(partial(made_of, inner[0]), written))
+    if origin is dict:
+        return {name: made_of(inner[1], each) for name, each in written.items()}
+    return _with_fields(kind, written) if isinstance(written, dict) else written
+
+
+def _with_fields(kind: Any, written: dict[str, Any]) -> Any:
+    kinds = get_type_hints(kind)
+    return kind(**{name: made_of(kinds[name], each) for name, each in written.items() if name in kinds})
+
+
+def _tuples(written: Any) -> Any:
+    return tuple(map(_tuples, written)) if isinstance(written, list) else written
 
 
 def _built_in(value: Any) -> Any:

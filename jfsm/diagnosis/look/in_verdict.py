@@ -3,7 +3,7 @@
 from ..._result import Estimate
 from ...reporting import capitalised
 from ...structures import Structure, causes
-from .._diagnosis import Finding
+from .._finding import Finding
 from .looked import MENDED, TURNED, Looked
 
 

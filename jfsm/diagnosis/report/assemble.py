@@ -6,7 +6,8 @@ from typing import NamedTuple
 from ..._format import FORMAT
 from ...plant import Reconstruction
 from ...structures import AbstractTerm, Clipping, Structure
-from .._diagnosis import CandidateResult, Diagnosis
+from .._diagnosis import Diagnosis
+from .._finding import CandidateResult
 from ..advice.detection_limits import Smallest
 from ..advice.next_test import Leading
 from ..channels.clock import Lateness
@@ -31,7 +32,7 @@ from .estimates import Units, modes_of_trial, noise_by_channel, plain_modes, ref
 from .findings import Ranked, findings_of, fitted_candidate, unfitted_candidate
 from .force_shape import Shape, shape_of
 from .late_forces import beside_late_forces, late_forces, times_of_forces
-from .plain_data import Drawn, jfsm_version, plain_gain, plain_record
+from .plain_data import Drawn, jfsm_version, plain_gain, plain_record, written_model
 from .sentences import difference_sentence, verdict_advice, verdict_sentence
 from .unfinished import Unfinished
 
@@ -115,6 +116,7 @@ def assemble(
         "record": plain_record(records),
         "model": model.describe(units),
         "extended": extended.describe(units),
+        "extended_toml": written_model(extended),
         "findings": as_plain(findings, lossless=False),
         "candidates": as_plain(candidates, lossless=False),
         "refitted": {p: {"given": model.values()[p], **as_plain(e, lossless=False)} for p, e in refit.items()},

@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..._result import Estimate
 from ...identification import Mode, Nuisances, modes_of, oscillations, ratios
 from ...structures import Structure
-from .._diagnosis import Estimate
 from ..advice.detection_limits import Smallest
 from ..evidence.fitted import Trial
 from ..evidence.plain import as_plain

@@ -9,7 +9,7 @@ import numpy as np
 from ...identification import Nuisances, Unknown
 from ...reporting import place_name
 from ...structures import OWN_VALUE, PARAMETER_CAUSES, ChannelDelay, Clipping, ForceDelay, Structure, is_offset
-from .._diagnosis import FOUND, CandidateResult, Finding, Rival
+from .._finding import FOUND, CandidateResult, Finding, Rival
 from ..advice.next_test import RIVAL
 from ..channels.clipping import clipped_channel
 from ..evidence.between_records import differences

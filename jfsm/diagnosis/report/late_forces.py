@@ -2,10 +2,11 @@
 
 from collections.abc import Iterator, Sequence
 
+from ..._result import Estimate
 from ...identification import Nuisances
 from ...plant import Channel, Reconstruction
 from ...structures import causes
-from .._diagnosis import FOUND, Estimate, Finding, Rival
+from .._finding import FOUND, Finding, Rival
 from ..channels.clock import Lateness
 from ..evidence.evidence import Setting
 from ..hypotheses.law_classes import DELAY

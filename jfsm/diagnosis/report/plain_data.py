@@ -10,7 +10,7 @@ import numpy as np
 
 from ...identification import Nuisances
 from ...records import Record
-from ...structures import AbstractTerm
+from ...structures import AbstractTerm, Structure
 from ..evidence.free_runs import Gain
 from ..evidence.missing_force import Residual, curves
 from ..evidence.plain import as_plain
@@ -56,6 +56,14 @@ def jfsm_version() -> str:
         return "unknown"
 
 
+def written_model(model: Structure) -> str | None:
+    """A structure as the text of its file; None where it holds a map or a function, which are no text."""
+    try:
+        return model.to_toml()
+    except ValueError:
+        return None
+
+
 def plain_record(records: Sequence[Nuisances]) -> dict[str, Any]:
     """Length, channels and noise of the first of the records, with the samples of all."""
     first = records[0]
@@ -79,7 +87,7 @@ def plain_gain(gain: Gain | None) -> dict[str, Any] | None:
         return None
     channels = {}
     for name, c in gain.channels.items():
-        row = {"unit": c.unit, "closed": c.closed}
+        row = {"unit": c.unit, "spread": c.spread, "closed": c.closed}
         for key in ("before", "refitted", "after", "floor"):
             row[key], row[f"{key}_nrmse"] = getattr(c, key), getattr(c, key) / c.spread
         channels[name] = row

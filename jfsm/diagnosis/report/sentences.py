@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from ...reporting import place_name, stopping_line
 from ...structures import Cause, causes
-from .._diagnosis import Finding
+from .._finding import Finding
 from ..advice.next_test import RIVAL
 from ..evidence.between_records import Difference
 from ..evidence.fitted import Trial

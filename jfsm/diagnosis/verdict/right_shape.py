@@ -22,8 +22,8 @@ def doubt(card: Scorecard, gained: float, bench: Bench, *, shapeless: bool = Fal
     too far, it fails.
 
     With `shapeless` only that gain is asked for. Without it also which share of the innovations they explain, and the
-    check has what is the nearer to its limit; two laws must leave innovations that are white, since two wrong ones
-    together come near most forces.
+    check has what is the nearer to its limit. Two kinds of law must leave innovations that are white, since two wrong
+    ones together come near most forces; one kind at several places need not, as dry friction in every joint.
     """
     limits, shapes = bench.limits, bench.evidence.other_shapes(card.key)
     white = bench.white(card)
@@ -35,7 +35,7 @@ def doubt(card: Scorecard, gained: float, bench: Bench, *, shapeless: bool = Fal
     says = _says(shapes, limit, bench)
     if white or shapeless:
         return far, bench.check("right_shape", card.key, shapes.nats, limit, says)
-    if len(_laws(card)) > 1:
+    if _kinds(card) > 1:
         says = f"its innovations correlate by {card.whiteness:.2g} from sample to sample; two laws must leave none"
         row = bench.check("right_shape", card.key, card.whiteness, limits.white, says, "correlation")
         return 0.0 if row.passed else card.whiteness / limits.white, row
@@ -140,7 +140,7 @@ def nearest(winner: Scorecard, bench: Bench) -> tuple[str, ...]:
 
 def _is_near(card: Scorecard, bench: Bench) -> bool:
     """Whether a law explains enough for its class to be right; two must explain almost all and leave nothing."""
-    if len(_laws(card)) < 2:
+    if _kinds(card) < 2:
         return bench.explained(card) >= bench.limits.half
     return bench.explained(card) >= bench.limits.almost_all and bench.left(card) < bench.limits.negligible
 
@@ -156,6 +156,15 @@ def _both_unseen(card: Scorecard, bench: Bench) -> Check | None:
     if len(_laws(card)) < 2 or bench.shows(bench.refitted):
         return None
     return bench.check("identifiable_here", card.key, 1, 0, _UNSEEN)
+
+
+def _kinds(card: Scorecard) -> int:
+    """How many kinds of law act: at different places those that share a class are one."""
+    kinds: list[EffectCard] = []
+    for law in _laws(card):
+        if not any(law.at != other.at and set(law.classes) & set(other.classes) for other in kinds):
+            kinds.append(law)
+    return len(kinds)
 
 
 def _laws(card: Scorecard) -> list[EffectCard]:
