@@ -7,6 +7,8 @@ from test_verdict import CAUSES, FRICTION, RIGHT, card, evidence_of, held, judge
 from jfsm.diagnosis.evidence.scorecard import GIVEN, REFITTED, OtherShapes
 from jfsm.diagnosis.hypotheses.effect import Effect
 from jfsm.diagnosis.nats import gains, many
+from jfsm.diagnosis.report.sentences import verdict_advice
+from jfsm.diagnosis.thresholds import THRESHOLDS
 from jfsm.diagnosis.verdict.claims import words
 from jfsm.diagnosis.verdict.decision import Decision
 from jfsm.diagnosis.verdict.judge import judge
@@ -80,11 +82,27 @@ def test_a_shape_that_was_not_tested_is_said_to_be_so(shapes: OtherShapes, impos
 
 
 @pytest.mark.parametrize(
+    ("mine", "refitted", "advice"),
+    [
+        (("stiffness@0-1.k",), (), "Look up stiffness@0-1.k of the model"),
+        (("stiffness@0-1.k",), ("stiffness@0-1.k",), "Record a second run"),
+        ((), (), "Record a second run"),
+    ],
+)
+def test_a_law_that_needs_another_value_of_the_model_s_own_is_an_occasion_to_look_it_up(mine, refitted, advice):
+    law = card(9000.0, 0.05, "coulomb", at_bounds=mine)  # it leaves much
+    evidence = evidence_of(refit(1000.0, 0.1, at_bounds=refitted), law, shapes=5000.0)
+    decision = judge(evidence, THRESHOLDS)
+    assert decision.verdict == "undecided"
+    assert verdict_advice(decision, None, evidence).startswith(advice)
+
+
+@pytest.mark.parametrize(
     ("mine", "refitted", "words"),
     [
         ((), (), "takes no own value to a bound"),
         (("mass@1.m",), ("mass@1.m",), "takes mass@1.m to a bound, as the refitted model does, too"),
-        (("mass@1.m",), (), "takes mass@1.m as far from what the model states as they may be"),
+        (("mass@1.m",), (), "takes mass@1.m as far from what the model states as a value may be"),
     ],
 )
 def test_own_values_at_a_bound_are_said_to_be_there(mine: tuple, refitted: tuple, words: str):

@@ -2,6 +2,7 @@
 
 from .._files import write_atomically as write_atomically
 from .._files import write_text_atomically as write_text_atomically
+from ._checks import nearest as nearest
 from ._checks import stopping_line as stopping_line
 from ._force_map_page import force_map_pictures as force_map_pictures
 from ._force_map_page import print_force_map as print_force_map

@@ -102,7 +102,7 @@ def assemble(
     drawn = Drawn(missing, runs, reached.term, first.record, first.period, with_shape=verdict != "consistent")
     sentence = verdict_sentence(decision, reached.winner, findings, gain, shape, differ, imposed=imposed)
     sentence = beside_late_forces(sentence, verdict, late)
-    sentence, advice = in_words(sentence, looked, verdict_advice(decision, gain, imposed=imposed))
+    sentence, advice = in_words(sentence, looked, verdict_advice(decision, gain, reached.evidence))
     decision = after_looks(decision, reached.evidence)
     findings = with_signs(findings, verdict, looked)
     data = {

@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 
-from ...reporting import place_name, stopping_line
+from ...reporting import nearest, place_name, stopping_line
 from ...structures import Cause, causes
 from .._finding import Finding
 from ..advice.next_test import RIVAL
 from ..evidence.between_records import Difference
+from ..evidence.evidence import Evidence
 from ..evidence.fitted import Trial
 from ..evidence.free_runs import Gain
 from ..thresholds import THRESHOLDS
@@ -58,13 +59,28 @@ def verdict_sentence(
     return f"Something is wrong beyond noise, and this record cannot tell what. {stopped}{looks}".strip()
 
 
-def verdict_advice(decision: Decision, gain: Gain | None, *, imposed: bool) -> str:
+def verdict_advice(decision: Decision, gain: Gain | None, evidence: Evidence) -> str:
     """What to do about the verdict."""
     if decision.verdict in ("cause", "undecided") and not decision.finished:
         return _GO_ON
     if decision.verdict in ("cause", "parameters") and gain is not None and not gain.significant:
         return _NO_GAIN
-    return (_ADVICE_IMPOSED if imposed else _ADVICE)[decision.verdict]
+    far = _too_far(decision, evidence)
+    if far:
+        given = f"{far[0].partition('@')[0]}=2"
+        return (
+            f"Look up {' and '.join(far)} of the model: the law that comes nearest would need another value than may "
+            f"be there. If as little is known of it, say so: model.uncertain({given}), or {given} under [uncertain] in "
+            "the model's file."
+        )
+    return (_ADVICE_IMPOSED if evidence.setting.imposed else _ADVICE)[decision.verdict]
+
+
+def _too_far(decision: Decision, evidence: Evidence) -> list[str]:
+    """Own values that the law which came nearest takes to their bounds, if it is refused for that."""
+    key = nearest({"verdict": decision.verdict, "decision": decision.plain})
+    refused = any(c.name == "own_values_within_bounds" and c.of == key and not c.passed for c in decision.checks)
+    return sorted(set(evidence.cards[key].at_bounds) - set(evidence.refitted.at_bounds)) if refused else []
 
 
 def difference_sentence(difference: Difference, unit: str) -> str:

@@ -60,7 +60,7 @@ def _law_is_itself(card: Scorecard, bench: Bench) -> Reason:
 
 def _own_values_within_bounds(card: Scorecard, bench: Bench) -> Reason:
     far = sorted(set(card.at_bounds) - set(bench.refitted.at_bounds))
-    says = f"takes {' and '.join(far)} as far from what the model states as they may be"
+    says = f"takes {' and '.join(far)} as far from what the model states as a value may be"
     told = says if far else _no_farther_than_refit(card)
     done = bench.check("own_values_within_bounds", card.key, len(far), 0, told)
     return "" if done.passed else says
