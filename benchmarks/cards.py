@@ -25,7 +25,7 @@ LIKELIEST = 3
 @contextlib.contextmanager
 def asking_widely() -> Iterator[None]:
     """Diagnoses in here measure of the likeliest hypotheses all that another verdict might ask."""
-    from jfsm.diagnosis import _diagnose
+    from jfsm.diagnosis import _conduct
     from jfsm.diagnosis.verdict.judge import judge_in_sign
 
     def judged(evidence: Any) -> Any:
@@ -33,7 +33,7 @@ def asking_widely() -> Iterator[None]:
         ask(evidence)
         return decision
 
-    with mock.patch.object(_diagnose, "judge_in_sign", judged):
+    with mock.patch.object(_conduct, "judge_in_sign", judged):
         yield
 
 

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 import jfsm
 from jfsm import _traced
 from jfsm._format import FORMAT
-from jfsm.diagnosis import _diagnose
+from jfsm.diagnosis import _conduct
 from jfsm.diagnosis.evidence import measured
 from jfsm.diagnosis.evidence.free_runs import Gain
 from jfsm.diagnosis.hypotheses.candidate import Candidate, as_promising, promising
@@ -69,9 +69,9 @@ def hidden_cubic(believed):
 @pytest.fixture(scope="module")
 def searched(believed):
     """What a search for few causes makes of a hidden cubic spring, before it is decided."""
-    kept, search = [], _diagnose._looked_into
+    kept, search = [], _conduct._looked_into
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(_diagnose, "_looked_into", lambda *arguments: kept.append(search(*arguments)) or kept[0])
+        patch.setattr(_conduct, "_looked_into", lambda *arguments: kept.append(search(*arguments)) or kept[0])
         jfsm.diagnose(made(duffing), believed, causes=FEW, key=jax.random.key(0))
     return kept[0]
 
@@ -81,7 +81,7 @@ def decided(searched, believed, monkeypatch):
     """The verdict on that search where held-out readings tell a given gain."""
 
     def of(gain: Gain) -> jfsm.Diagnosis:
-        monkeypatch.setattr(_diagnose, "_looked_into", lambda *arguments: searched)
+        monkeypatch.setattr(_conduct, "_looked_into", lambda *arguments: searched)
         monkeypatch.setattr(measured, "measure_gain", lambda *arguments, **how: (gain, []))
         return jfsm.diagnose(made(duffing), believed, causes=FEW, key=jax.random.key(0))
 
@@ -152,6 +152,7 @@ def test_a_diagnosis_is_read_back_from_its_json(hidden_cubic, tmp_path):
     assert [(c.cause, c.at, c.why) for c in again.candidates] == [
         (c.cause, c.at, c.why) for c in hidden_cubic.candidates
     ]
+    assert again.gain is not None and hidden_cubic.gain is not None
     assert again.gain.closed == hidden_cubic.gain.closed and again.gain.channels == hidden_cubic.gain.channels
     assert again.extended.values() == pytest.approx(hidden_cubic.extended.values(), rel=1e-12)
     assert again.why() == hidden_cubic.why() and repr(again) == repr(hidden_cubic)

@@ -98,15 +98,15 @@ def test_a_spring_that_a_simulation_lacks_is_found_from_its_output_alone():
     stated = {path: float(value) for path, value in re.findall(r"(\S+) = ([-+.e\d]+)", said)}
     known = {"mass@1": MASS, "stiffness@0-1.k": STIFFNESS, "damping@0-1.c": DAMPING}
     assert stated == pytest.approx(known, rel=0.002)
-    apart = float(re.search(r"displacement 1 by ([\d.]+)%", note(d, "The simulation's own run departs"))[1])
-    x, own = measured().displacement[:, 0], motion_of()
-    assert apart == pytest.approx(100 * np.std(x - own) / np.std(x), abs=0.06)
+    (apart,) = re.findall(r"displacement 1 by ([\d.]+)%", note(d, "The simulation's own run departs"))
+    x, own = measured().channels["displacement", 1], motion_of()
+    assert float(apart) == pytest.approx(100 * np.std(x - own) / np.std(x), abs=0.06)
 
 
 def test_a_run_under_another_force_will_do():
     shift = 300
     run = simulated()
-    later = jfsm.Record(TIME[shift:], force=force(TIME[shift:]), displacement=run.displacement[shift:, 0])
+    later = jfsm.Record(TIME[shift:], force=force(TIME[shift:]), displacement=run.channels["displacement", 1][shift:])
     d = jfsm.diagnose(measured(0.0), simulated=later, causes=FEW, key=KEY)
     assert d.verdict == "consistent"
     assert not [text for text in d.notes if text.startswith("The simulation's own run departs")]
@@ -211,4 +211,4 @@ def test_a_black_box_that_is_none_is_refused(run, error, says):
 
 def test_a_run_that_is_no_function_is_told_from_its_output():
     with pytest.raises(TypeError, match=r"goes into diagnose\(record, simulated=...\)"):
-        jfsm.Simulation.from_runs(measured(0.0))
+        jfsm.Simulation.from_runs(measured(0.0))  # pyright: ignore[reportArgumentType]
