@@ -90,7 +90,7 @@ def test_what_moves_unseen_needs_a_model():
 
 
 def test_a_spring_that_a_simulation_lacks_is_found_from_its_output_alone():
-    d = jfsm.diagnose(measured(), simulated=simulated(), causes=FEW, key=KEY)
+    d = jfsm.diagnose(measured(), simulated=simulated(), causes=FEW, key=KEY, until=14.0)
     (finding,) = d.findings
     assert finding.cause == "cubic_hardening"
     assert finding.parameters["k3"].value == pytest.approx(HARDENING, rel=0.02)

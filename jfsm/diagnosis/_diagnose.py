@@ -113,9 +113,10 @@ def diagnose(
     if time_limit is not None and not time_limit > 0:
         raise ValueError(f"`time_limit` must be positive, in seconds; got {time_limit:g}. Without it there is none.")
     limit = Limit(time_limit)
-    records = [part.between(since, until) for part in records_of(record)]
+    whole = records_of(record)
+    records = [part.between(since, until) for part in whole]
     key = jax.random.key(secrets.randbits(32)) if key is None else key
-    runs = _runs(records, model, simulated)
+    runs = _runs(whole, model, simulated)
     with shown_by_default(progress) as told, ended_by_interrupt(limit):
         steps = Steps(told, 4 + bool(runs))
         if runs:
@@ -123,7 +124,7 @@ def diagnose(
             tell = steps.of("what the simulation does")
             form = model if isinstance(model, Structure) else None
             found = stand_in(runs, form, key, limit, lambda what, done, total: tell(what, total - done))
-            said = [found.words, *filter(None, map(departure, runs, records))]
+            said = [found.words, *filter(None, map(departure, runs, whole))]
             records, model = [part.noted(*said) for part in records], found.structure
         assert isinstance(model, Structure)
         d = conduct(records, model, holdout, causes, max_causes, key, places, reconstruction, limit, steps)

@@ -22,8 +22,8 @@ _HARDLY_KNOWN = 2.0
 """Trust in the values of a linear stand-in of a simulation that is not linear, as a logarithm."""
 _WITHIN = 7.0
 """Ratio of the ends of an interval from which a dashpot where no spring is is no part of the simulation."""
-
 _WORTH_SAYING = 1e-3
+"""Error of a stand-in that is said in numbers."""
 _WAYS: tuple[Reconstruction, ...] = ("band-limited", "linear", "hold")
 _BETWEEN = {
     "linear": " It takes the force for straight between samples.",
@@ -32,8 +32,7 @@ _BETWEEN = {
 
 
 class StandIn(NamedTuple):
-    """A structure that moves as a simulation does, and its error on runs that it was not fitted to, as a share of the
-    motion."""
+    """A structure that moves as a simulation does, and the error of its free runs, as a share of the motion."""
 
     structure: Structure
     error: float
@@ -145,7 +144,7 @@ def _with_laws(
     steps = Steps(progress, 4)
     d = conduct(simulated, fitted.uncertain(**hardly), 0.3, laws, 2, key, None, way, limit, steps)
     error = np.inf if d.gain is None else d.gain.after
-    return StandIn(d.extended.having(sensors=fitted.sensors, trust={}), error, linear.drive)
+    return StandIn(d.extended.having(sensors=fitted.sensors, trust=fitted.trust), error, linear.drive)
 
 
 def driven_alike(simulated: Record, record: Record) -> Record:
