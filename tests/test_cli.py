@@ -88,9 +88,9 @@ def answer(monkeypatch, verdict: str = "consistent") -> dict[str, Any]:
     """Lets `diagnose` return this verdict at once; what it was called with appears in the dictionary."""
     seen: dict[str, Any] = {}
 
-    def quick(records, model, holdout, causes, max_causes, key, time_limit, progress):
+    def quick(records, model, holdout, causes, max_causes, key, simulated, time_limit, progress):
         seen.update(records=records, model=model, holdout=holdout, causes=causes, max_causes=max_causes, key=key)
-        seen.update(time_limit=time_limit)
+        seen.update(simulated=simulated, time_limit=time_limit)
         for step, what in enumerate(("looking: here", "looking: there", "deciding"), start=1):
             progress(what, step, 4)
         return FakeDiagnosis(verdict=verdict)
@@ -396,10 +396,26 @@ def test_a_missing_model_file_is_named(channels, tmp_path):
     assert f"There is no model file {tmp_path / 'gone.toml'}" in text
 
 
-def test_a_model_is_asked_for():
-    result = run("diagnose", "run.csv")
-    assert result.exit_code == 2
-    assert "--model" in result.stderr
+def test_a_model_or_the_output_of_a_simulation_is_asked_for(channels, tmp_path):
+    text = refusal("diagnose", *channels)
+    assert text.startswith("jfsm: --model or --simulated must be given")
+    gone = tmp_path / "gone.csv"
+    assert f"No such file or directory: {gone}" in refusal("diagnose", *channels, "--simulated", gone)
+    here = channels[0]
+    assert "is an input of this command" in refusal("diagnose", *channels, "--simulated", here, "--json", here)
+
+
+@pytest.mark.parametrize("header", ["t,y", "t,u,y"])
+def test_the_output_of_a_simulation_may_leave_out_what_drives_it(header, channels, tmp_path, monkeypatch):
+    time = np.arange(50) / RATE
+    columns = {"t": time, "u": np.cos(time), "y": 1000 * np.sin(time)}
+    table = np.column_stack([columns[name] for name in header.split(",")])
+    np.savetxt(tmp_path / "output.csv", table, "%.17g", ",", header=header, comments="")
+    seen = answer(monkeypatch)
+    assert run("diagnose", *channels, "--simulated", tmp_path / "output.csv").exit_code == 0
+    assert seen["model"] is None
+    np.testing.assert_allclose(seen["simulated"].channels["displacement", 1], np.sin(time), atol=1e-12)  # from mm
+    assert (("force", 1) in seen["simulated"].channels) == ("u" in header)
 
 
 def test_a_holdout_that_is_neither_share_nor_file_is_refused(channels, folder):
