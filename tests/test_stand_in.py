@@ -146,6 +146,51 @@ def test_a_spring_that_a_simulation_has_is_no_cause_but_what_it_lacks_is():
     assert d.extended.values()["cubic_stiffness@0-1.k3"] == pytest.approx(2 * HARDENING, rel=0.03)
 
 
+@pytest.mark.slow  # one mass tells as much of the way there
+def test_friction_between_two_masses_is_found_at_its_place_without_any_model():
+    mass, friction = np.diag([1.0, 0.7]), 1.5
+    stiffness, damping = np.array([[1400.0, -500.0], [-500.0, 500.0]]), np.array([[9.0, -3.0], [-3.0, 3.0]])
+
+    def moved(limit: float) -> np.ndarray:
+        def law(x, v):
+            return stiffness @ x + damping @ v + limit * np.tanh((v[1] - v[0]) / 2e-3) * np.array([-1.0, 1.0])
+
+        return smooth_motion(mass, law, lambda t: np.array([force(t), 0.0]), TIME, [0, 0], [0, 0], tolerance=1e-8)[0]
+
+    x = moved(friction)
+    record = jfsm.Record(
+        TIME, force=force(TIME), displacement=x + 0.01 * x.std(0) * np.random.default_rng(5).standard_normal(x.shape)
+    )
+    d = jfsm.diagnose(record, simulated=jfsm.Record(TIME, displacement=moved(0.0)), causes=FEW, key=KEY)
+    (finding,) = d.findings
+    assert finding.kind == "dry friction" and finding.at == (1, 2)
+    assert finding.parameters["F"].value == pytest.approx(friction, rel=0.03)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("released", [True, False])
+def test_what_moves_without_a_force_is_compared_by_a_unit_mass(released: bool):
+    x0 = 0.1 if released else 0.0
+
+    def drive(t):
+        return np.array([0.0 if released else -force(t)])
+
+    def moved(hardening: float) -> np.ndarray:
+        def law(x, v):
+            return STIFFNESS * x + 2.0 * v + hardening * x**3
+
+        return smooth_motion(1.0, law, drive, TIME, x0, 0.0, tolerance=1e-8)[0][:, 0]
+
+    x = moved(HARDENING)
+    base = None if released else force(TIME)
+    noise = 0.003 * np.std(x) * np.random.default_rng(5).standard_normal(x.size)
+    record = jfsm.Record(TIME, displacement=x + noise, base_acceleration=base)
+    d = jfsm.diagnose(record, simulated=jfsm.Record(TIME, displacement=moved(0.0)), causes=FEW, key=KEY)
+    (finding,) = d.findings
+    assert finding.cause == "cubic_hardening"
+    assert finding.parameters["k3"].value == pytest.approx(HARDENING, rel=0.03)
+
+
 # What is refused
 
 
