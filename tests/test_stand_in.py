@@ -8,6 +8,7 @@ import pytest
 from references import smooth_motion
 
 import jfsm
+from jfsm.diagnosis._diagnose import _runs
 from jfsm.identification import rough_model
 from jfsm.structures import Runs
 
@@ -133,6 +134,15 @@ def test_a_black_box_is_run_under_what_drives_the_record():
     (finding,) = d.findings
     assert finding.cause == "stiffness_value"
     assert finding.parameters["k"].value == pytest.approx(1.08 * STIFFNESS, rel=0.005)
+
+
+@pytest.mark.parametrize("made", [dict, lambda motion: jfsm.Record(TIME, **motion)])
+def test_what_drives_the_record_drives_the_run_of_a_black_box(made):
+    box = jfsm.Simulation.from_runs(lambda record: made({"displacement": np.sin(record.time)}))
+    record = measured(0.0)
+    (run,) = _runs([record], box, None)
+    np.testing.assert_array_equal(run.channels["force", 1], record.channels["force", 1])
+    np.testing.assert_array_equal(run.channels["displacement", 1], np.sin(TIME))
 
 
 @pytest.mark.slow  # two searches, of which one is that for the simulation's own spring

@@ -145,7 +145,7 @@ def _runs(
     if isinstance(model, Runs):
         if simulated is not None:
             raise ValueError("`simulated` must be left out where `model` makes runs itself.")
-        return [model.tried_on(record) for record in records]
+        return [driven_alike(model.tried_on(record), record) for record in records]
     if model is not None and not isinstance(model, Structure):
         raise TypeError(
             f"`model` must be a structure, such as jfsm.Structure.sdof(1.0, 9.0, 0.1), or a simulation; got {model!r}."

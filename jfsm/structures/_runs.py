@@ -36,7 +36,7 @@ class Runs:
         return f"Runs({getattr(self._run, '__name__', self._run)!s})"
 
     def of(self, record: Record) -> Record:
-        """The run under what drives a record.
+        """The motion under what drives a record.
 
         Raises
         ------
@@ -49,20 +49,15 @@ class Runs:
         if isinstance(made, Record):
             return made
         columns = made if isinstance(made, Mapping) else {kind: getattr(made, kind, None) for kind in _MOTIONS}
-        motion = {kind: columns[kind] for kind in _MOTIONS if columns.get(kind) is not None}
+        motion: dict[str, Any] = {kind: columns[kind] for kind in _MOTIONS if columns.get(kind) is not None}
         if not motion:
             raise TypeError(
                 "`run` must give a record, or a mapping such as {'displacement': x}; it gives "
                 f"{type(made).__name__}{f' with {list(columns)}' if isinstance(made, Mapping) else ''}."
             )
-        forces = {dof: samples for (kind, dof), samples in record.channels.items() if kind == "force"}
+        units = {kind: record.units[kind] for kind in motion}
         try:
-            return Record(
-                record.time, force=forces or None, base_acceleration=record.base_acceleration, at_rest=record.at_rest,
-                units={kind: record.units[kind] for kind in ("force", *motion)},
-                displacement=motion.get("displacement"), velocity=motion.get("velocity"),
-                acceleration=motion.get("acceleration"),
-            )  # fmt: skip
+            return Record(record.time, at_rest=record.at_rest, units=units, **motion)
         except ValueError as error:
             raise ValueError(f"`run` must give samples on the record's own clock: {error}") from error
 
