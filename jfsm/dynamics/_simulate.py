@@ -33,6 +33,7 @@ from ..plant import (
     measured_force,
     observation_of,
     run_again,
+    run_by_itself,
     run_grid,
     run_strided,
     starting_state,
@@ -49,6 +50,7 @@ from ..structures import (
     AccelerationGain,
     ChannelDelay,
     Clipping,
+    EvaluatedMotion,
     ForceDelay,
     ForceGain,
     MapTerm,
@@ -309,7 +311,7 @@ def _free_run(
 ) -> _Run:
     """The run of a structure with known numbers from a known start, under samples of the force (n, dof)."""
     sticks = any(isinstance(t, AbstractFriction) for t in model.terms)
-    own_scheme = sticks or any(t.delay is not None for t in model.terms)
+    own_scheme = sticks or any(t.delay is not None for t in model.terms) or isinstance(model.own, EvaluatedMotion)
 
     def drive(substeps: int) -> InterpolatedInput:
         return excitation(record, model.dof, substeps, reconstruction, length=bucket(len(record)), force=force)
@@ -347,6 +349,8 @@ def _grid_run(model: Structure, record: Record, inputs: InterpolatedInput, start
         every, length = inputs.substeps // stride, inputs.force.shape[0] * inputs.substeps
         reach = lower(model, grid=_steps_of(record.dt, inputs.substeps)).reach
         motion = run_grid(replace(plant, reach=reach), inputs.by_steps(stride, length), *begin)
+    elif isinstance(plant.own, EvaluatedMotion):
+        motion = run_by_itself(plant, inputs.strided(stride), n, *start)
     else:
         motion = run_strided(plant, inputs, jnp.asarray(stride), *begin)
     x, v, a = (np.asarray(q)[: n * every : every] for q in motion)

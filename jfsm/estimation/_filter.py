@@ -35,6 +35,7 @@ from ..plant import (
     Motion,
     Observation,
     Plant,
+    Tabulated,
     acceleration,
     advance_sample,
     any_ended,
@@ -50,6 +51,7 @@ from ..plant import (
     linearised,
     load_of,
     mode_at,
+    near,
     push,
     settle,
     stopping,
@@ -220,7 +222,8 @@ class Stretch(NamedTuple):
     """Inputs of some samples: what drives the lanes, and what was read.
 
     `force` (n, halves, lanes, dof) and `base` (n, halves) are on the half steps of each sample; `before`
-    (n, lanes, late, 5, dof + 1) is what drove earlier, for every channel that is late, the base last.
+    (n, lanes, late, 5, dof + 1) is what drove earlier, for every channel that is late, the base last. `near` (n, ...)
+    is how plants of their own motion move there, if they do.
     """
 
     force: Float[Array, "n halves lanes dof"]
@@ -229,6 +232,7 @@ class Stretch(NamedTuple):
     time: Float[Array, " n"]
     values: Float[Array, "n channels"]
     use: Float[Array, "n channels"]
+    near: Tabulated | None = None
 
 
 class Lanes(NamedTuple):
@@ -240,6 +244,15 @@ class Lanes(NamedTuple):
     def __call__(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """What a function makes of the plant and the arguments of every lane."""
         return jax.vmap(lambda floats, *mine: function(eqx.combine(floats, self.fixed), *mine))(self.floats, *arguments)
+
+    def near(self, table: Tabulated | None, time: Float[Array, ""], step: Float[Array, ""]) -> "Lanes":
+        """The lanes in a sample, of whose row of a table each has its own numbers."""
+        if table is None:
+            return self
+        local = self(lambda plant: near(plant, table, time, step).local)
+        with_local = partial(eqx.tree_at, lambda plant: plant.local, is_leaf=lambda leaf: leaf is None)
+        nothing = jax.tree.map(lambda _: None, local)
+        return Lanes(with_local(self.floats, local), with_local(self.fixed, nothing))
 
     def first(self) -> Plant:
         """The plant of the first lane."""
@@ -340,6 +353,7 @@ def _sample(
     each: Lanes, known: Known, observation, of_zeros, dt, states: State, now: Stretch, advanced: Callable[..., Motion]
 ) -> tuple[State, Passage]:
     """States of all lanes after a sample, and how they went through it."""
+    each = each.near(now.near, now.time, dt)
     force, base = jnp.moveaxis(now.force, 1, 0), now.base  # (lanes, halves, dof)
     substeps = (base.size - 1) // 2
 

@@ -12,7 +12,7 @@ rule of differentiation has to know what a law does.
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import equinox as eqx
 import jax
@@ -23,7 +23,7 @@ from jaxtyping import Bool, Float, Shaped
 from .._types import Array
 from ..estimation._filter import Assumed, Innovations, ProcessNoise, Readings, State, Stretch, begun, on_lanes, run
 from ..estimation._imposed import force_innovations
-from ..plant import DelayBuffer, Imposed, InterpolatedInput, Observation, Plant, jit_with_kernels
+from ..plant import DelayBuffer, Imposed, InterpolatedInput, Observation, Plant, Tabulated, jit_with_kernels
 from ._drive import between_samples, forces_before, undelayed_force
 from ._layout import place_of, with_vector, without_part
 
@@ -198,7 +198,7 @@ class Scene:
 
     A plant (of it the numbers that parameters can change do not matter), which channels show what, what is imposed, the
     readings, and the standard deviation (state,) of the state at the first sample. `stretches` keeps those of the
-    record, by their first sample.
+    record, by their first sample. `near` is how a plant of its own motion moves near the record's.
     """
 
     plant: Plant
@@ -207,13 +207,15 @@ class Scene:
     readings: Readings
     doubt: Any
     stretches: dict[int, Stretch]
+    near: Tabulated | None = None
 
     @property
     def has_laws(self) -> bool:
         """Whether anything but linear springs, dashpots and masses acts."""
         plant = self.plant
         others = plant.friction, plant.memory, plant.delayed, plant.maps
-        return any(len(part) for part in others) or bool(np.any(plant.smooth.direction)) or plant.own is not None
+        own = plant.own is not None or self.near is not None
+        return any(len(part) for part in others) or bool(np.any(plant.smooth.direction)) or own
 
     @cached_property
     def lowered(self) -> tuple[list[Array], Any]:
@@ -237,6 +239,20 @@ class Scene:
 
     def stretch(self, begin: int) -> Stretch:
         """Samples from `begin`, as many as a program runs, as the record has them."""
+        found = self._recorded(begin)
+        if self.near is None:
+            return found
+        if begin not in self._rows:
+            self._rows[begin] = jax.device_put(jax.tree.map(lambda rows: _padded(rows, begin, "edge"), self.near))
+        return found._replace(near=self._rows[begin])
+
+    @cached_property
+    def _rows(self) -> dict[int, Tabulated]:
+        """Of the table, by the first sample."""
+        return {}
+
+    def _recorded(self, begin: int) -> Stretch:
+        """The same without a table."""
         if begin in self.stretches:
             return self.stretches[begin]
         inputs, readings = self.inputs, self.readings
@@ -279,12 +295,10 @@ def _filtered(scene: Scene, runs: Runs, count: int, found: Innovations) -> None:
             whole[:, rows] = np.asarray(lanes)[: rows.stop - rows.start, : len(whole)].swapaxes(0, 1)
 
 
-def _padded(rows: np.ndarray, begin: int) -> Any:
-    """Rows from `begin`, as many as a program runs, zero where there are none."""
-    found = np.zeros((SAMPLES, *rows.shape[1:]))
-    mine = rows[begin : begin + SAMPLES]
-    found[: len(mine)] = mine
-    return found
+def _padded(rows: np.ndarray, begin: int, mode: Literal["constant", "edge"] = "constant") -> Any:
+    """Rows from `begin`, as many as a program runs, zero where there are none, or the last again."""
+    mine = rows[begin : begin + SAMPLES].astype(float, copy=False)
+    return np.pad(mine, ((0, SAMPLES - len(mine)), *((0, 0),) * (rows.ndim - 1)), mode)
 
 
 class Noise(eqx.Module):
@@ -357,7 +371,8 @@ def lanes_before(
         def one(plant, assumed, x0, v0, force):
             return begun(plant, assumed, x0, v0, force, base, time, dt)
 
-        return on_lanes(plants)(one, assumed, x0, v0, force)
+        table = jax.tree.map(lambda rows: rows[0], stretch.near)
+        return on_lanes(plants).near(table, time, dt)(one, assumed, x0, v0, force)
 
     return plants, assumed, observation, jax.lax.cond(first, begin, lambda: state)
 

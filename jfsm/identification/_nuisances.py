@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float
 from ..estimation._filter import ProcessNoise, Readings, Stretch
 from ..plant import (
     Channel,
+    Course,
     Imposed,
     InterpolatedInput,
     Observation,
@@ -33,7 +34,7 @@ from ..plant import (
     typical_size,
 )
 from ..records import Record, advanced, clipped, noise_floor, quantisation_step, spikes
-from ..structures import Structure
+from ..structures import EvaluatedMotion, Structure
 from ._channels import LEAST_NOISE, driving, forces, readings_of, spread_of
 from ._colour import Colour
 
@@ -117,6 +118,8 @@ class Nuisances:
         Memory of the channels' noise, where it is known to have one.
     swing : Swing or None
         The motion of several masses, where it has been estimated.
+    course : Course or None
+        The measured motion near which a function of its own is tabulated; None where there is none, or no measured one.
     late : dict
         How late [s] channels of the force were that are in time here, by (kind, degree of freedom).
     stretches : dict
@@ -149,6 +152,7 @@ class Nuisances:
     forgiven: float = 0.0
     colour: Colour | None = None
     swing: Swing | None = None
+    course: Course | None = None
     late: Mapping[Channel, float] = field(default_factory=dict)
     stretches: dict[int, Stretch] = field(default_factory=dict, init=False, repr=False)
     _heads: dict[int, tuple[Imposed, Readings]] = field(default_factory=dict, init=False, repr=False)
@@ -221,8 +225,9 @@ class Nuisances:
 
     def showing(self, values: Float[np.ndarray, "n channels"]) -> "Nuisances":
         """The same record, had its channels shown `values` (n, channels)."""
+        course = None if self.course is None else self.course.showing(dict(zip(self.channels, values.T, strict=True)))
         values = np.pad(values, ((0, self.readings.valid.size - len(values)), (0, 0)))
-        return replace(self, readings=replace(self.readings, values=values))
+        return replace(self, readings=replace(self.readings, values=values), course=course)
 
     def with_wandering(self, channels: Sequence[int]) -> "Nuisances":
         """The same record, the zeros of these channels wandering by up to the size of their readings."""
@@ -362,6 +367,7 @@ def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "
         at_rest=record.at_rest,
         reconstruction=reconstruction,
         notes=(*record.notes, *seen.notes, *words),
+        course=_course(model, record, channels, values),
     )
 
 
@@ -432,6 +438,20 @@ def _prepare_imposed(record: Record, model: Structure, reconstruction: Reconstru
         notes=(*record.notes, *path.notes, *notes),
         path=path,
     )
+
+
+def _course(model: Structure, record: Record, channels: tuple[Channel, ...], values: np.ndarray) -> Course | None:
+    """The motion near which a function of a model's own is tabulated."""
+    if model.own is None:
+        return None
+    found = Course.of(dict(zip(channels, values.T, strict=True)), model.dof, record.dt, float(record.time[0]))
+    if found is None and isinstance(model.own, EvaluatedMotion):
+        raise ValueError(
+            "`record` must show the displacement of every coordinate of a simulation by `from_accelerations`; its "
+            f"channels are {', '.join(f'{kind} {j}' for kind, j in channels)}. Estimate the motion first "
+            "(jfsm.estimate_motion), or write the accelerations with jax.numpy."
+        )
+    return found
 
 
 def _mass(structure: Structure) -> np.ndarray:

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Shaped
 from scipy.optimize import minimize
 
 from ..estimation._filter import Innovations
-from ..plant import Grid, Imposed, Plant, hidden_width, laws_of, numbers_of
+from ..plant import Grid, Imposed, Plant, Tabulated, hidden_width, laws_of, numbers_of
 from ..structures import AbstractFriction, ChannelDelay, ForceDelay, Structure
 from ._colour import Colour
 from ._layout import besides_numbers, plant_rows, plant_vector
@@ -380,11 +380,12 @@ class _Part:
     unit: np.ndarray
     log: np.ndarray
     tie: np.ndarray
+    near: Tabulated | None
     scenes: dict[int, Scene] = field(default_factory=dict)
 
     @cached_property
     def fixed(self) -> Hashable:
-        return besides_numbers(self.plant)
+        return besides_numbers(self.plant), id(self.near)
 
     def scene(self, nuisances: Nuisances, until: int) -> Scene:
         """`of_record` of the record that the part was made for, made once."""
@@ -398,7 +399,7 @@ class _Part:
         imposed = isinstance(nuisances.inputs, Imposed)
         inputs, readings = nuisances.head(until) if imposed else (nuisances.inputs, nuisances.readings)
         doubt = _doubt(self.plant, nuisances)
-        return Scene(self.plant, nuisances.observation, inputs, readings, doubt, nuisances.stretches)
+        return Scene(self.plant, nuisances.observation, inputs, readings, doubt, nuisances.stretches, self.near)
 
     def numbers(self, theta: np.ndarray) -> np.ndarray:
         """Numbers (runs, size) at values (runs, unknowns)."""
@@ -412,6 +413,9 @@ class _Part:
         cls, structure: Structure, unknowns: Sequence[Unknown], nuisances: Nuisances, mine: np.ndarray, slots: dict
     ) -> "_Part":
         plant = numbers_of(structure, nuisances.channels, **slots)
+        near = None if nuisances.course is None else nuisances.course.near(structure)
+        if near is not None:  # the table stands for the function
+            plant = replace(plant, own=None)
         vector, dof, channels = plant_vector(plant), structure.dof, len(nuisances.channels)
         tail = (
             {f"x0@{j + 1}": j for j in range(dof)}
@@ -434,7 +438,7 @@ class _Part:
                 rows[k, : vector.size] = found[u.path]
                 base[: vector.size] -= found[u.path] * known[u.path]
         unit, log = np.array([u.unit for u in unknowns]), np.array([u.log for u in unknowns], bool)
-        return cls(plant, mine, base, rows, unit, log, tie)
+        return cls(plant, mine, base, rows, unit, log, tie, near)
 
 
 def _doubt(plant: Plant, nuisances: Nuisances) -> np.ndarray:

@@ -10,13 +10,12 @@ from functools import cached_property
 from itertools import compress
 from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.stats import qmc
 
 from ..estimation import Latent
-from ..plant import HIDDEN_SUBSTEPS, bucket, direction, forces_of_law, lower, own_force
+from ..plant import HIDDEN_SUBSTEPS, bucket, direction, forces_of_law, own_force
 from ..structures import AbstractTerm, LinearDamping, LinearStiffness, Scale, Structure
 from ._nuisances import Nuisances
 
@@ -302,7 +301,7 @@ def _basis(
             doubt.append(_SPRING if spring else _DASHPOT)
     if structure.own is not None:  # what it would need more were a number of its own larger
         motion = latent.displacement, latent.velocity, latent.acceleration
-        by_number = np.asarray(own_force(lower(structure), *map(jnp.asarray, (*motion, time)))[2])
+        by_number = own_force(structure.own, structure.own_numbers, *motion, time)[2]
         columns += list(np.moveaxis(by_number, 2, 0))
         doubt += [_DASHPOT] * by_number.shape[2]
     for j in range(dof):

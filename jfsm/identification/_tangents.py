@@ -26,7 +26,7 @@ from jaxtyping import Bool, Float, Shaped
 from .._traced import jit_kept, kept_result
 from .._types import Array
 from ..estimation._filter import Passage, State, Stretch, few_states, passages, shown
-from ..plant import InterpolatedInput, acceleration, advance_sample, begin, inverse_mass, true_force
+from ..plant import InterpolatedInput, acceleration, advance_sample, begin, inverse_mass, near, true_force
 from ._layout import with_vector
 from ._likelihood import NUDGE, SAMPLES, Scene, Slopes, lanes_before, minus_log_density, tail_of
 
@@ -148,18 +148,18 @@ def _by_unknowns(static: Any, leaves, run, lot, dt, stretch: Stretch, passed: Pa
     stride = min(_COARSER, (stretch.base.shape[1] - 1) // 2)
     force, base = stretch.force[:, ::stride, 0], stretch.base[:, ::stride]
 
-    def one(row, predicted, read, force, base, time):
+    def one(row, predicted, read, force, base, time, table):
         """Readings at a sample, and the state at the next."""
-        lane = with_vector(plant, row)
+        lane = near(with_vector(plant, row), table, time, dt)
         minv, g = inverse_mass(lane), true_force(lane, force, base)
         x, v, z, mode = predicted
         a = acceleration(lane, minv, x, v, z, mode, g[0], time)[0] + base[0]
         y = (1.0 + lane.channel_gain) * shown(observation, predicted, a) + lane.channel_offset
         return y, _flat(advance_sample(lane, minv, read, g, base, time, dt))
 
-    along = jax.vmap(one, (None, 0, 0, 0, 0, 0))
-    samples = passed.predicted, passed.read, force, base, stretch.time
-    there = jax.vmap(along, (0, *(None,) * 5), 2)(lot, *samples)
+    along = jax.vmap(one, (None, *(0,) * 6))
+    samples = passed.predicted, passed.read, force, base, stretch.time, stretch.near
+    there = jax.vmap(along, (0, *(None,) * 6), 2)(lot, *samples)
     by_y, by_m = ((new - old[..., None]) / NUDGE for new, old in zip(there, along(run, *samples), strict=True))
     by_m = jnp.pad(by_m, ((0, 0), (0, passed.rows.shape[2] - by_m.shape[1]), (0, 0)))
     return _carried(passed, begins, by_y, jnp.zeros((*by_y.shape[:2], *by_m.shape[1:])), by_m)

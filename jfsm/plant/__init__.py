@@ -8,6 +8,8 @@ of one step and one sample serve filters. `imposed_motion` and `force_needed` ar
 
 from ._along import HIDDEN_SUBSTEPS as HIDDEN_SUBSTEPS
 from ._along import force_along as force_along
+from ._by_itself import run_by_itself as run_by_itself
+from ._course import Course as Course
 from ._drive import Reconstruction as Reconstruction
 from ._excitation import Swing as Swing
 from ._excitation import bucket as bucket
@@ -52,7 +54,6 @@ from ._law_along import forces_of_law as forces_of_law
 from ._needed import force_needed as force_needed
 from ._needed import needed as needed
 from ._own_motion import linear_part as linear_part
-from ._own_motion import own_force as own_force
 from ._pair import check_pair as check_pair
 from ._plant import Channel as Channel
 from ._plant import Grid as Grid
@@ -82,3 +83,7 @@ from ._stepper import stopping as stopping
 from ._stepper import through_events as through_events
 from ._stepper import times as times
 from ._stepper import with_friction as with_friction
+from ._tabulated import Tabulated as Tabulated
+from ._tabulated import near as near
+from ._tabulated import own_force as own_force
+from ._tabulated import tabulated as tabulated

@@ -1,5 +1,6 @@
 """Free runs on the sample grid, many parameter sets at once."""
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -13,6 +14,7 @@ from .._types import Array, is_traced
 from ._forces import Scalar, Square, State, hidden_start
 from ._plant import Plant
 from ._stepper import Load, Motion, acceleration, advance, inverse_mass, mode_at
+from ._tabulated import Tabulated, near
 
 Run = Float[Array, "n dof"]
 
@@ -21,17 +23,23 @@ class InterpolatedInput(eqx.Module):
     """Input of a run between consecutive samples, on half steps.
 
     `force` (n, 2 substeps + 1, dof) holds the applied forces of the interval after each sample, `base`
-    (n, 2 substeps + 1) the acceleration of the base.
+    (n, 2 substeps + 1) the acceleration of the base, `near` (n, ...) how a plant of its own motion moves there, where
+    that is known.
     """
 
     force: Float[Array, "n halves dof"]
     base: Float[Array, "n halves"]
     time: Float[Array, " n"]
     step: Float[Array, ""]
+    near: Tabulated | None = None
 
     @property
     def substeps(self) -> int:
         return (self.force.shape[1] - 1) // 2
+
+    def strided(self, stride: int) -> "InterpolatedInput":
+        """The same input with steps `stride` times as long."""
+        return replace(self, force=self.force[:, ::stride], base=self.base[:, ::stride])
 
     def by_steps(self, stride: int = 1, length: int | None = None) -> "InterpolatedInput":
         """The same input with every `stride` steps a sample of one step, padded to `length` of these."""
@@ -58,7 +66,7 @@ def undelayed(plant: Plant, inputs: InterpolatedInput) -> InterpolatedInput:
     columns = [shifted(flat[:, j], plant.force_delay[j] / inputs.step * (halves - 1)) for j in range(dof)]
     later = jnp.stack(columns, 1)
     take = jnp.arange(n)[:, None] * (halves - 1) + jnp.arange(halves)[None, :]
-    return InterpolatedInput(later[take], inputs.base, inputs.time, inputs.step)
+    return InterpolatedInput(later[take], inputs.base, inputs.time, inputs.step, inputs.near)
 
 
 def drive_before(
@@ -305,17 +313,40 @@ def free_run(
     plant: Plant, inputs: InterpolatedInput, x0: State, v0: State, again: bool = False
 ) -> tuple[Run, Run, Run]:
     """As `run_grid`, to be traced; as `run_again` if `again`."""
-    minv = inverse_mass(plant)
     inputs = undelayed(plant, inputs)
 
     def body(carry, sample):
         motion, buffer = carry
-        force, base, time = sample
-        g = load_of(plant, minv, motion, buffer, force, base, time, inputs.step)
-        a = acceleration(plant, minv, motion.x, motion.v, motion.z, motion.mode, g[0], time)[0]
-        after = advance_sample(plant, minv, motion, g, base, time, inputs.step)
-        return (after, push(buffer, motion.x, motion.v)), (motion.x, motion.v, a)
+        after, a = _after(plant, inputs.step, motion, buffer, sample)
+        return after, (motion.x, motion.v, a)
 
-    start = begin(plant, minv, x0, v0, inputs)
+    first = jax.tree.map(lambda rows: rows[0], inputs.near)
+    start = begin(near(plant, first, inputs.time[0], inputs.step), inverse_mass(plant), x0, v0, inputs)
     steps = jax.checkpoint(body) if again else body
-    return jax.lax.scan(steps, start, (inputs.force, inputs.base, inputs.time))[1]
+    return jax.lax.scan(steps, start, (inputs.force, inputs.base, inputs.time, inputs.near))[1]
+
+
+def _after(plant: Plant, step: Scalar, motion: Motion, buffer: DelayBuffer, sample: tuple[Any, ...]):
+    """Motion and delay buffer one sample later, and the acceleration at the sample: its load, base, time and table."""
+    force, base, time, table = sample
+    plant, minv = near(plant, table, time, step), inverse_mass(plant)
+    g = load_of(plant, minv, motion, buffer, force, base, time, step)
+    a = acceleration(plant, minv, motion.x, motion.v, motion.z, motion.mode, g[0], time)[0]
+    after = advance_sample(plant, minv, motion, g, base, time, step)
+    return (after, push(buffer, motion.x, motion.v)), a
+
+
+@jit_kept
+def run_on(
+    plant: Plant, inputs: InterpolatedInput, motion: Motion, buffer: DelayBuffer
+) -> tuple[Run, tuple[Motion, DelayBuffer]]:
+    """Acceleration (n, dof) at every sample of a run that goes on from a state, and the states at the samples and after
+    the last."""
+
+    def body(carry, sample):
+        motion, buffer = carry
+        after, a = _after(plant, inputs.step, motion, buffer, sample)
+        return after, (a, carry)
+
+    last, (a, states) = jax.lax.scan(body, (motion, buffer), (inputs.force, inputs.base, inputs.time, inputs.near))
+    return a, jax.tree.map(lambda rows, end: jnp.concatenate([rows, end[None]]), states, last)

@@ -1,4 +1,4 @@
-"""A plant that moves by a function of its own: what is linear in it, and the force that a motion needs."""
+"""What is linear in a plant that moves by a function of its own."""
 
 from dataclasses import replace
 
@@ -6,9 +6,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
-from .._types import Array
 from ._forces import Square, State
 from ._plant import Plant
 
@@ -30,32 +28,3 @@ def _slopes(plant: Plant, rest: State) -> tuple[Square, Square]:
     """Derivatives of the accelerations at rest by displacement and velocity."""
     assert plant.own is not None
     return jax.jacfwd(plant.own, (1, 2))(plant.own_numbers, rest, rest, rest, jnp.zeros(()))
-
-
-@eqx.filter_jit
-def own_force(
-    plant: Plant,
-    x: Float[Array, "n dof"],
-    v: Float[Array, "n dof"],
-    a: Float[Array, "n dof"],
-    time: Float[Array, " n"],
-) -> tuple[Float[Array, "n dof"], Float[Array, "n dof dof"], Float[Array, "n dof own"]]:
-    """Force (n, dof) that a plant of its own motion needs for accelerations `a` (n, dof) along a motion.
-
-    With its derivatives (n, dof, dof) by the accelerations, which are the mass matrices, and (n, dof, own) by the
-    logarithms of the plant's numbers.
-    """
-    own = plant.own
-    assert own is not None
-
-    def needed(numbers, x, v, a, t):
-        mass = jnp.linalg.inv(own.answer(numbers, x, v, t))
-        return mass @ (a - own(numbers, x, v, jnp.zeros_like(x), t)), mass
-
-    def along(x, v, a, t):
-        def scaled(log):
-            return needed(plant.own_numbers * jnp.exp(log), x, v, a, t)[0]
-
-        return *needed(plant.own_numbers, x, v, a, t), jax.jacfwd(scaled)(jnp.zeros_like(plant.own_numbers))
-
-    return jax.vmap(along)(x, v, a, time)

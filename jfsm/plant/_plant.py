@@ -25,6 +25,7 @@ from ..structures import (
     AccelerationBias,
     ChannelDelay,
     Clipping,
+    EvaluatedMotion,
     ForceDelay,
     LinearDamping,
     LinearStiffness,
@@ -113,12 +114,42 @@ class MapSlot(eqx.Module):
     direction: Float[Array, " dof"]
 
 
+class Local(eqx.Module):
+    """How a plant of its own motion moves within a sample, on nodes from its beginning to its end.
+
+    What is not inertia needs `force` + `stiffness` x + `damping` v.
+    """
+
+    mass: Float[Array, "*lanes nodes dof dof"]
+    force: Float[Array, "*lanes nodes dof"]
+    stiffness: Float[Array, "*lanes nodes dof dof"]
+    damping: Float[Array, "*lanes nodes dof dof"]
+    time: Float[Array, "*lanes"]
+    step: Float[Array, "*lanes"]
+
+    def weights(self, t: Float[Array, ""]) -> Float[Array, " nodes"]:
+        """Those of the nodes at an instant between them."""
+        last = self.mass.shape[0] - 1
+        place = jnp.clip(last * (t - self.time) / self.step, 0.0, last)
+        return jnp.maximum(1.0 - jnp.abs(place - jnp.arange(last + 1)), 0.0)
+
+    def mass_at(self, t: Float[Array, ""]) -> Float[Array, "dof dof"]:
+        """Mass matrix at an instant."""
+        return jnp.sum(self.weights(t)[:, None, None] * self.mass, 0)
+
+    def force_at(self, x: Float[Array, " dof"], v: Float[Array, " dof"], t: Float[Array, ""]) -> Float[Array, " dof"]:
+        """Force that all but the inertia needs."""
+        by_node = self.force + jnp.sum(self.stiffness * x[None, None, :] + self.damping * v[None, None, :], 2)
+        return jnp.sum(self.weights(t)[:, None] * by_node, 0)
+
+
 class Plant(eqx.Module):
     """Arrays of a structure and of its sensors, for one list of response channels.
 
     `force_gain`, `force_offset` and `channel_offset` are empty where every lane has its own elsewhere, `force_delay`
     and `channel_delay` without delayed sensors: delays have programs of their own. The plant of a simulation moves by
-    its `own` function of `own_numbers`, and `mass` is the mass matrix at rest; the terms act beside.
+    its `own` function of `own_numbers`, and `mass` is the mass matrix at rest; the terms act beside. Within a sample of
+    a measured motion it moves as `local` says, in place of the function.
     `late_channel` holds the channel of each channel delay. Delayed forces reach back at most `reach` samples. With
     `rolled` stages of a step the program is a third smaller, as fast for one motion and its derivatives, and half as
     fast for many motions. Plants side by side have a leading axis of lanes on every array but those of whole numbers.
@@ -140,9 +171,10 @@ class Plant(eqx.Module):
     channel_delay: Float[Array, "*lanes late"]
     late_channel: Int[Array, " late"]
     own_numbers: Float[Array, "*lanes own"]
-    own: OwnMotion | None = eqx.field(static=True)
+    own: OwnMotion | EvaluatedMotion | None = eqx.field(static=True)
     reach: int = eqx.field(static=True)
     rolled: bool = eqx.field(static=True)
+    local: Local | None = None
 
     @property
     def dof(self) -> int:

@@ -1,5 +1,6 @@
 """Initial state of a free run."""
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -11,11 +12,13 @@ from jaxtyping import Float
 from .._traced import jit_kept
 from .._types import as_array
 from ..records import Record
-from ..structures import Structure
+from ..structures import EvaluatedMotion, Structure
+from ._course import Course
 from ._drive import Reconstruction
 from ._excitation import bucket, excitation, substeps_for, typical_size
 from ._grid import free_run, shifted
 from ._plant import Channel, Grid, lower, observation_of
+from ._tabulated import Tabulated
 
 _ITERATIONS = 12
 _FAR = 0.1
@@ -75,12 +78,35 @@ def _least_squares(model: Structure, head: Record, reconstruction: Reconstructio
     for i, (kind, j) in enumerate(channels):  # a measured channel is its own best first guess
         if kind in ("displacement", "velocity"):
             state[(j - 1) + (model.dof if kind == "velocity" else 0)] = offset[0, i]
+    near = _near(model, channels, offset, head)
+    if near is not None:  # so near the readings as the start must be, a table stands for the function
+        rows = [(0, padded - len(head))]
+        near = jax.tree.map(lambda q: np.pad(q, rows + [(0, 0)] * (q.ndim - 1), "edge"), near)
+        inputs, plant = replace(inputs, near=near), replace(plant, own=None)
     readings = np.pad(y, ((0, padded - len(head)), (0, 0)))
     known = plant, observation, inputs, readings, spread, counted
     cost, found = min((_descended(known, begin) for begin in (state, *_rests(model, channels))), key=lambda end: end[0])
     if cost > _FAR**2 * y.size:
         _, found = min((cost, found), _grown(known, state), key=lambda end: end[0])
     return found[: model.dof], found[model.dof :]
+
+
+def _near(
+    model: Structure, channels: tuple[Channel, ...], readings: Float[np.ndarray, "n channels"], head: Record
+) -> Tabulated | None:
+    """The table of a simulation's function near the readings; None where there is no such function, or where they do
+    not show every coordinate."""
+    if model.own is None:
+        return None
+    course = Course.of(dict(zip(channels, readings.T, strict=True)), model.dof, head.dt, float(head.time[0]))
+    if course is not None:
+        return course.near(model)
+    if isinstance(model.own, EvaluatedMotion):
+        raise ValueError(
+            "`record` must show the displacement of every coordinate, or begin at rest, for the start of a simulation "
+            "by `from_accelerations` to be found; pass `initial_state`, or make the record with `at_rest=True`."
+        )
+    return None
 
 
 def _grown(known: tuple, state: np.ndarray) -> tuple[float, np.ndarray]:

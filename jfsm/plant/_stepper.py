@@ -61,12 +61,16 @@ def times(matrix: Float[Array, "rows columns"], vector: Float[Array, " columns"]
 
 def inverse_mass_at(plant: Plant, minv: Square, x: State, v: State, t: Scalar) -> Square:
     """Inverse of the mass matrix in a state: that of a plant with its own motion is another one in every state."""
+    if plant.local is not None:
+        return _solved(plant.local.mass_at(t), jnp.eye(plant.dof))
     return minv if plant.own is None else plant.own.answer(plant.own_numbers, x, v, t)
 
 
 def free_acceleration(plant: Plant, minv: Square, x: State, v: State, z: Hidden, g: State, t: Scalar) -> State:
     """Acceleration without friction."""
     net = g - smooth_force(plant, x, v, z, t)
+    if plant.local is not None:
+        return _solved(plant.local.mass_at(t), net - plant.local.force_at(x, v, t))
     return times(minv, net) if plant.own is None else plant.own(plant.own_numbers, x, v, net, t)
 
 
@@ -102,13 +106,14 @@ def holding_force(plant: Plant, minv: Square, a: State, sticking: Bool[Array, " 
 
 
 def _solved(matrix, right):
-    """Solution of a small positive definite system."""
+    """Solution of a small positive definite system, of a vector or of columns."""
     # Eliminated here, without pivots: a call of a library would leave the compiled step.
     for i in range(right.shape[0]):
         row, value = matrix[i] / matrix[i, i], right[i] / matrix[i, i]
         others = jnp.where(jnp.arange(right.shape[0]) == i, 0.0, matrix[:, i])
         matrix = (matrix - others[:, None] * row[None, :]).at[i].set(row)
-        right = (right - others * value).at[i].set(value)
+        of_value = others * value if right.ndim == 1 else others[:, None] * value[None, :]
+        right = (right - of_value).at[i].set(value)
     return right
 
 

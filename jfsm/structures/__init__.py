@@ -4,6 +4,7 @@ from ._catalogue import OWN_VALUE as OWN_VALUE
 from ._catalogue import PARAMETER_CAUSES as PARAMETER_CAUSES
 from ._catalogue import Cause as Cause
 from ._catalogue import causes as causes
+from ._own_motion import EvaluatedMotion as EvaluatedMotion
 from ._own_motion import OwnMotion as OwnMotion
 from ._runs import Runs as Runs
 from ._sensors import AbstractSensor as AbstractSensor

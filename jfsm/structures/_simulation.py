@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 
 from .._types import as_numbers, is_traced
 from ..records import Record
-from ._own_motion import Acceleration, OwnMotion
+from ._own_motion import Acceleration, EvaluatedMotion, OwnMotion
 from ._runs import Runs
 from ._sensors import AbstractSensor
 from ._structure import Structure
@@ -67,34 +67,64 @@ class Simulation(Structure):
 
     def __init__(
         self,
-        acceleration: Acceleration | OwnMotion,
+        acceleration: Acceleration | OwnMotion | EvaluatedMotion,
         dof: int,
         parameters: Mapping[str, Any] | None = None,
         terms: Iterable[AbstractTerm] = (),
         sensors: Iterable[AbstractSensor] = (),
         trust: Mapping[str, float] | Iterable[tuple[str, float]] = (),
     ):
-        tried = isinstance(acceleration, OwnMotion)
-        if not tried and not callable(acceleration):
-            raise TypeError(
-                "`acceleration` must be a function of (q, v, force, t, p) that gives accelerations; "
-                f"got {acceleration!r}."
-            )
-        if isinstance(dof, bool) or not isinstance(dof, int | np.integer) or dof < 1:
-            raise ValueError(f"`dof` must be the number of coordinates, at least 1; got {dof!r}.")
-        named = dict(parameters or {})
-        for name in named:
-            if not isinstance(name, str) or not name.isidentifier():
-                raise ValueError(f"`parameters` must have names such as length or k_2; got {name!r}.")
-        own = acceleration if tried else OwnMotion(acceleration, tuple(named))
-        values = [as_numbers(value, f"parameters {name}", 0) for name, value in named.items()]
-        numbers = jnp.stack([jnp.asarray(value) for value in values]) if values else jnp.zeros(0)
-        if not tried:
-            _try(own, numbers, dof)
+        numbers = _numbers_of(parameters)
+        if isinstance(acceleration, OwnMotion | EvaluatedMotion):
+            own = acceleration  # tried before
+        else:
+            own = OwnMotion(acceleration, tuple(parameters or {}))
+            _check(acceleration, "acceleration", dof, own.names)
+            _try(own, _of_one(own, numbers, dof), numbers, dof)
         mass = (jnp if is_traced(numbers) else np).linalg.inv(_answer(own, numbers, jnp.zeros(dof)))
         mass = (mass + mass.T) / 2
         super().__init__(mass, terms, sensors, trust)
         self.own, self.own_numbers = own, numbers
+
+    @staticmethod
+    def from_accelerations(
+        accelerations: Acceleration,
+        dof: int,
+        parameters: Mapping[str, Any] | None = None,
+        terms: Iterable[AbstractTerm] = (),
+        sensors: Iterable[AbstractSensor] = (),
+        trust: Mapping[str, float] | Iterable[tuple[str, float]] = (),
+    ) -> "Simulation":
+        """A plant whose accelerations can be asked for in any state, by a program that JAX cannot trace.
+
+        A fit asks for them near the measured motion, so that a record must show the displacement of every coordinate.
+
+        Parameters
+        ----------
+        accelerations : callable
+            ``accelerations(q, v, force, t, p)`` gives the accelerations (n, dof) in `n` states at once, as NumPy
+            arrays: coordinates `q` (n, dof), velocities `v` (n, dof), generalised forces `force` (n, dof), and instants
+            `t` (n,) [s]; `p` holds the numbers by name. It is additive in the force, and has no memory and no jumps.
+        dof, parameters, terms, sensors, trust
+            As of a `Simulation`.
+
+        Raises
+        ------
+        TypeError, ValueError
+            As of a `Simulation`.
+
+        Examples
+        --------
+        >>> import jax; jax.config.update("jax_enable_x64", True)
+        >>> import numpy as np, jfsm
+        >>> def pendulums(q, v, force, t, p):
+        ...     return (force - 0.01 * v - 9.81 * 0.5 * np.sin(q)) / p["inertia"]
+        >>> model = jfsm.Simulation.from_accelerations(pendulums, dof=1, parameters={"inertia": 0.25})
+        """
+        own, numbers = EvaluatedMotion(accelerations, tuple(parameters or {})), _numbers_of(parameters)
+        _check(accelerations, "accelerations", dof, own.names)
+        _try(own, _of_many(own, numbers, dof), numbers, dof)
+        return Simulation(own, dof, parameters, terms, sensors, trust)
 
     @staticmethod
     def from_runs(run: Callable[[Record], Any]) -> Runs:
@@ -152,36 +182,80 @@ class Simulation(Structure):
         return self._again(numbers, terms, sensors, self.trust)
 
 
-def _try(own: OwnMotion, numbers: Float[Array, " own"], dof: int) -> None:
-    """Refuse a function that does not keep what is promised of it."""
-    rest, some, ask = jnp.zeros(dof), jnp.linspace(1.0, 2.0, dof), jax.jit(partial(OwnMotion.__call__, own))
+def _check(function: Any, name: str, dof: Any, names: tuple[str, ...]) -> None:
+    """Refuse what is no function, no number of coordinates, or no names."""
+    if not callable(function):
+        raise TypeError(
+            f"`{name}` must be a function of (q, v, force, t, p) that gives accelerations; got {function!r}."
+        )
+    if isinstance(dof, bool) or not isinstance(dof, int | np.integer) or dof < 1:
+        raise ValueError(f"`dof` must be the number of coordinates, at least 1; got {dof!r}.")
+    for own in names:
+        if not isinstance(own, str) or not own.isidentifier():
+            raise ValueError(f"`parameters` must have names such as length or k_2; got {own!r}.")
+
+
+def _numbers_of(parameters: Mapping[str, Any] | None) -> Float[Array, " own"]:
+    values = [as_numbers(value, f"parameters {name}", 0) for name, value in (parameters or {}).items()]
+    return jnp.stack([jnp.asarray(value) for value in values]) if values else jnp.zeros(0)
+
+
+def _of_one(own: OwnMotion, numbers: Float[Array, " own"], dof: int) -> Callable[..., np.ndarray]:
+    """The acceleration in a state, by a program, if JAX can make one of it that gives the promised shape."""
+    none, ask = jnp.zeros(dof), jax.jit(partial(OwnMotion.__call__, own))
     try:
-        shape = jax.eval_shape(ask, numbers, rest, rest, rest, jnp.zeros(())).shape
+        shape = jax.eval_shape(ask, numbers, none, none, none, jnp.zeros(())).shape
     except jax.errors.JAXTypeError as error:
         raise TypeError(
             "`acceleration` must be a function that JAX can trace: written with jax.numpy, with jnp.where in place of "
-            f"`if`. JAX says: {str(error).splitlines()[0]}"
+            "`if`. One that is not goes into jfsm.Simulation.from_accelerations. JAX says: "
+            f"{str(error).splitlines()[0]}"
         ) from error
     if shape != (dof,):
         raise ValueError(
             f"`acceleration` must give one acceleration per coordinate, shape ({dof},); it gives shape {shape}."
         )
+    return lambda *state: np.asarray(ask(numbers, *map(jnp.asarray, state)))
+
+
+def _of_many(own: EvaluatedMotion, numbers: Float[Array, " own"], dof: int) -> Callable[..., np.ndarray]:
+    """The acceleration in a state, asked for in rows of two, if the function gives the promised shape."""
+
+    def ask(q: Any, v: Any, force: Any, t: Any) -> np.ndarray:
+        given = dict(zip(own.names, np.asarray(numbers).tolist(), strict=True))
+        rows = [np.repeat(np.asarray(part, float)[None], 2, 0) for part in (q, v, force, t)]
+        found = np.asarray(own.function(*rows, given))
+        if found.shape != (2, dof):
+            raise ValueError(
+                f"`accelerations` must give a row of {dof} accelerations per state, for two states shape (2, {dof}); "
+                f"it gives shape {found.shape}."
+            )
+        return found[1]
+
+    return ask
+
+
+def _try(
+    own: OwnMotion | EvaluatedMotion, ask: Callable[..., np.ndarray], numbers: Float[Array, " own"], dof: int
+) -> None:
+    """Refuse a function that does not keep what is promised of it."""
+    name = "acceleration" if isinstance(own, OwnMotion) else "accelerations"
+    some = np.linspace(1.0, 2.0, dof)
     for x, v, t in _PROBES:
-        state = numbers, jnp.full(dof, x), jnp.full(dof, v)
-        free, pushed, twice, opposite = (
-            np.asarray(ask(*state, share * some, jnp.asarray(t))) for share in (0.0, 1.0, 2.0, -1.0)
-        )
+        q, w = np.full(dof, x), np.full(dof, v)
+        free, pushed, twice, opposite = (ask(q, w, share * some, t) for share in (0.0, 1.0, 2.0, -1.0))
         if not np.all(np.isfinite([free, pushed, twice, opposite])):
             raise ValueError(
-                f"`acceleration` must be finite; at q = {x:g}, v = {v:g}, t = {t:g} s it gives {pushed.tolist()}."
+                f"`{name}` must be finite; at q = {x:g}, v = {v:g}, t = {t:g} s it gives {pushed.tolist()}."
             )
-        once, again = (np.asarray(own(*state, rest, jnp.asarray(t))) for _ in range(2))
+        state = [jnp.asarray(part) for part in (q, w, np.zeros(dof), t)]
+        once, again = (np.asarray(own(numbers, *state)) for _ in range(2))
         if not np.array_equal(once, again):
-            raise ValueError("`acceleration` must give the same whenever it is asked the same; it does not.")
+            raise ValueError(f"`{name}` must give the same whenever it is asked the same; it does not.")
         bend = max(np.max(np.abs(twice - 2 * pushed + free)), np.max(np.abs(pushed + opposite - 2 * free)))
         if bend > _ADDITIVE * max(np.max(np.abs(pushed - free)), np.max(np.abs(free)), 1e-300):
             raise ValueError(
-                "`acceleration` must be additive in `force`: a(f1 + f2) - a(f1) - a(f2) + a(0) = 0. It departs from "
+                f"`{name}` must be additive in `force`: a(f1 + f2) - a(f1) - a(f2) + a(0) = 0. It departs from "
                 f"that by {bend:.3g}. Friction and limits inside the function are better added as terms, for example "
                 "jfsm.Coulomb(F, at=(0, 1))."
             )
@@ -189,13 +263,15 @@ def _try(own: OwnMotion, numbers: Float[Array, " own"], dof: int) -> None:
         skew = np.max(np.abs(answer - answer.T))
         if skew > _SYMMETRIC * np.max(np.abs(answer)) or np.min(np.linalg.eigvalsh((answer + answer.T) / 2)) <= 0:
             raise ValueError(
-                "`acceleration` must answer forces as masses do, by a symmetric positive definite matrix; at "
+                f"`{name}` must answer forces as masses do, by a symmetric positive definite matrix; at "
                 f"q = {x:g} that of accelerations per unit of force is {answer.tolist()}. Forces are generalised: each "
                 "acts along its own coordinate."
             )
 
 
 @eqx.filter_jit
-def _answer(own: OwnMotion, numbers: Float[Array, " own"], q: Float[Array, " dof"]) -> Float[Array, "dof dof"]:
+def _answer(
+    own: OwnMotion | EvaluatedMotion, numbers: Float[Array, " own"], q: Float[Array, " dof"]
+) -> Float[Array, "dof dof"]:
     """Accelerations per unit of force of a plant that stands still."""
     return own.answer(numbers, q, jnp.zeros_like(q), jnp.zeros(()))

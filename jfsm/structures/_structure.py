@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._types import as_array, as_numbers, is_traced
-from ._own_motion import OwnMotion
+from ._own_motion import EvaluatedMotion, OwnMotion
 from ._sensors import AbstractSensor
 from ._term import AbstractTerm, Parameter
 from .terms import LinearDamping, LinearStiffness
@@ -42,7 +42,7 @@ class Structure(eqx.Module):
     terms: tuple[AbstractTerm, ...]
     sensors: tuple[AbstractSensor, ...]
     trust: tuple[tuple[str, float], ...] = eqx.field(static=True)
-    own: OwnMotion | None = eqx.field(static=True, repr=False)
+    own: OwnMotion | EvaluatedMotion | None = eqx.field(static=True, repr=False)
     """The function that a `Simulation` moves by."""
     own_numbers: Float[Any, " own"] = eqx.field(repr=False)
 
