@@ -31,6 +31,8 @@ from .records import Record as Record
 from .records import align as align
 from .records import join as join
 from .records import read as read
+from .structures import AbstractFriction as AbstractFriction
+from .structures import AbstractTerm as AbstractTerm
 from .structures import AccelerationBias as AccelerationBias
 from .structures import AccelerationGain as AccelerationGain
 from .structures import AttachedOscillator as AttachedOscillator
@@ -61,6 +63,7 @@ from .structures import LinearStiffness as LinearStiffness
 from .structures import LuGre as LuGre
 from .structures import Maxwell as Maxwell
 from .structures import Offset as Offset
+from .structures import Parameter as Parameter
 from .structures import ParametricStiffness as ParametricStiffness
 from .structures import PeriodicDisturbance as PeriodicDisturbance
 from .structures import PositionDamping as PositionDamping
@@ -70,6 +73,7 @@ from .structures import QuadraticDamping as QuadraticDamping
 from .structures import QuadraticStiffness as QuadraticStiffness
 from .structures import QuinticStiffness as QuinticStiffness
 from .structures import Saturation as Saturation
+from .structures import Scale as Scale
 from .structures import Simulation as Simulation
 from .structures import SineStiffness as SineStiffness
 from .structures import SmoothCoulomb as SmoothCoulomb

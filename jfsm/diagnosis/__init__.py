@@ -6,6 +6,7 @@ from ._diagnosis import Diagnosis as Diagnosis
 from ._finding import Finding as Finding
 from .advice.next_test import Proposal as Proposal
 from .evidence.evidence import Evidence as Evidence
+from .hypotheses.alike import confused_with as confused_with
 from .thresholds import Thresholds as Thresholds
 from .verdict.again import judge_again as judge_again
 from .verdict.decision import Decision as Decision
