@@ -103,3 +103,5 @@ from .surrogates import Spherical as Spherical
 from .surrogates import Spline as Spline
 from .surrogates import find_discontinuities as find_discontinuities
 from .surrogates import load_map as load_map
+
+__version__: str

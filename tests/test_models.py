@@ -71,10 +71,8 @@ def test_terms_are_listed_with_their_units_and_formulas():
     assert "force_gain eps: The force sensor reads (1 + eps) times the force." in text
     one = run("terms", "coulomb").stdout
     entry = one.partition("[[term]]")[2]
-    assert (
-        "friction force" in one
-        and jfsm.Structure.from_toml(f"mass = [1.0]\n[[term]]{entry}").terms[0].kind == "coulomb"
-    )
+    (term,) = jfsm.Structure.from_toml("mass = [1.0]\n[[term]]" + entry).terms
+    assert "friction force" in one and isinstance(term, jfsm.Coulomb)
     assert "There is no kind 'coulom'. Did you mean coulomb or smooth_coulomb?" in refusal("terms", "coulom")
 
 

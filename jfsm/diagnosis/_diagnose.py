@@ -12,7 +12,7 @@ from .._types import require_x64
 from ..plant import Reconstruction
 from ..records import Record
 from ..reporting import shown_by_default
-from ..structures import CauseLike, Runs, Structure
+from ..structures import CauseLike, Runs, Structure, check_order
 from ._conduct import conduct
 from ._diagnosis import Diagnosis
 from ._stand_in import departure, driven_alike, stand_in
@@ -109,6 +109,7 @@ def diagnose(
     (``jax.config.update("jax_enable_compilation_cache", False)``).
     """
     require_x64()
+    check_order("jfsm.diagnose(record, model)", model, record)
     if max_causes < 1:
         raise ValueError(f"`max_causes` must be at least 1; got {max_causes}.")
     if time_limit is not None and not time_limit > 0:

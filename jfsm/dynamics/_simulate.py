@@ -54,6 +54,7 @@ from ..structures import (
     MapTerm,
     Offset,
     Structure,
+    check_order,
 )
 from ..surrogates import AbstractForceStateMap, tabulate
 from ._agreement import Agreement, agreement
@@ -251,6 +252,7 @@ def simulate(
     as they are, and the derivative is exactly that of this run. The start must be known: given, or at rest.
     """
     require_x64()
+    check_order("jfsm.simulate(model, record)", model, record)
     check_scheme(solver, tolerance)
     check_pair(model, record, imposed=True)
     record = mended(record)

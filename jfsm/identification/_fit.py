@@ -13,7 +13,7 @@ from .._threads import side_by_side, small_matrices
 from .._types import require_x64
 from ..plant import Reconstruction
 from ..records import Record, mended
-from ..structures import Offset, Structure, is_offset
+from ..structures import Offset, Structure, check_order, is_offset
 from ._maximise import Maximum, approach, finish
 from ._missing_links import missing_links, words_of
 from ._modes import Mode, modes_of
@@ -118,6 +118,7 @@ def fit(
         If a name in `fixed` or `bounds` means nothing, bounds are the wrong way round, or the record cannot be used.
     """
     require_x64()
+    check_order("jfsm.fit(model, record)", model, record)
     records = [record] if isinstance(record, Record) else list(record)
     if not records:
         raise ValueError("`record` must hold at least one record; the sequence is empty.")

@@ -7,6 +7,7 @@ from ._catalogue import CauseLike as CauseLike
 from ._catalogue import causes as causes
 from ._catalogue import causes_of as causes_of
 from ._definition import own_laws as own_laws
+from ._order import check_order as check_order
 from ._own_motion import OwnMotion as OwnMotion
 from ._runs import Runs as Runs
 from ._sensors import SENSORS as SENSORS
