@@ -3,6 +3,8 @@
 from . import paper as paper
 from . import systems as systems
 from .diagnosis import Diagnosis as Diagnosis
+from .diagnosis import Sides as Sides
+from .diagnosis import compare as compare
 from .diagnosis import diagnose as diagnose
 from .dynamics import Backbone as Backbone
 from .dynamics import FixedPoint as FixedPoint

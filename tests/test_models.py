@@ -57,7 +57,10 @@ def test_a_frequency_and_a_damping_ratio_make_a_model():
         (["--stiffness", "3", "--damping", "2", "--damping-ratio", "0.1"], "--damping-ratio must not both be given"),
         (["--stiffness", "3,4", "--damping-ratio", "0.1"], "give --stiffness and --damping for each of the 2"),
         (["--frequency", "0"], "--frequency must be a positive number; it was 0"),
-        (["--stiffness", "3,x"], "--stiffness must be numbers with commas between, as 1,2.5; it was '3,x'"),
+        (
+            ["--stiffness", "3,x"],
+            "--stiffness must be a number, or numbers with commas between, as 1,2.5; it was '3,x'",
+        ),
         (["--mass", "1,2", "--stiffness", "3"], "`stiffness` must have one value per mass (2); got 1"),
     ],
 )

@@ -93,6 +93,22 @@ def _numbers(name: str, text: str | None) -> list[float] | None:
 _Name = Annotated[str | None, typer.Argument(metavar="NAME", help="Show this one alone, in full.", show_default=False)]
 
 
+_Json = Annotated[Path, typer.Argument(help="What `jfsm diagnose --json` wrote.", show_default=False)]
+
+
+@command
+def compare(first: _Json, second: _Json) -> None:
+    """Show two diagnoses side by side: verdicts, causes, sizes, own values and errors."""
+    from ..diagnosis import compare_numbers
+    from ..reporting import read_diagnosis
+
+    names = ("first", "second") if first.stem == second.stem else (first.stem, second.stem)
+    found = compare_numbers(read_diagnosis(first), read_diagnosis(second), names)
+    for section in dict.fromkeys(row.section for row in found.rows):
+        rows = [cells for row, cells in zip(found.rows, found.cells(), strict=True) if row.section == section]
+        show_table(section.capitalize(), ("", *names, "unit", ""), rows)
+
+
 @command
 def terms(kind: _Name = None) -> None:
     """List what a model file may hold: kinds of terms and sensor effects, their parameters and formulas."""

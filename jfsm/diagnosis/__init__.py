@@ -1,6 +1,9 @@
 """What is wrong: candidates, evidence, verdict, gain."""
 
 from .._result import Estimate as Estimate
+from ._compare import Sides as Sides
+from ._compare import compare as compare
+from ._compare import compare_numbers as compare_numbers
 from ._diagnose import diagnose as diagnose
 from ._diagnosis import Diagnosis as Diagnosis
 from ._finding import Finding as Finding
