@@ -134,6 +134,18 @@ def _rows(first: Mapping[Key, Cell], second: Mapping[Key, Cell]) -> Iterator[Row
 
 def _of_diagnosis(d: Mapping[str, Any]) -> Iterator[tuple[Key, Cell]]:
     yield ("verdict", "verdict", ""), str(d["verdict"])
+    yield from _causes(d)
+    for path, value in d["refitted"].items():
+        yield ("own values", path, value["unit"]), _estimate(value)
+    for number, mode in enumerate(d["modes"], 1):
+        yield ("modes", f"mode {number}, frequency", mode["frequency"]["unit"]), _estimate(mode["frequency"])
+        yield ("modes", f"mode {number}, damping ratio", ""), _estimate(mode["damping_ratio"])
+    yield from _errors(d["gain"] or {})
+    for channel in d["record"]["channels"]:
+        yield ("noise", f"noise of {channel['name']}", channel["unit"]), channel["noise"]
+
+
+def _causes(d: Mapping[str, Any]) -> Iterator[tuple[Key, Cell]]:
     for finding in d["findings"]:
         at = "-".join(map(str, finding["at"]))
         name = f"{finding['cause']}@{at}"
@@ -142,20 +154,15 @@ def _of_diagnosis(d: Mapping[str, Any]) -> Iterator[tuple[Key, Cell]]:
             yield ("causes", f"{name}.{parameter}", value["unit"]), _estimate(value)
         if finding["size"]:
             yield ("causes", f"{finding['kind']}, size", finding["size"]["unit"]), _estimate(finding["size"])
-    for path, value in d["refitted"].items():
-        yield ("own values", path, value["unit"]), _estimate(value)
-    for number, mode in enumerate(d["modes"], 1):
-        for what, words in (("frequency", "frequency"), ("damping_ratio", "damping ratio")):
-            yield ("modes", f"mode {number}, {words}", mode[what]["unit"].replace("1", "")), _estimate(mode[what])
-    gain = d["gain"] or {}
+
+
+def _errors(gain: Mapping[str, Any]) -> Iterator[tuple[Key, Cell]]:
     for channel, row in (gain.get("channels") or {}).items():
         for error in ("before", "refitted", "after", "floor"):
             yield ("errors", f"error of {channel}, {error}", row["unit"]), row[error]
     if gain.get("closed") is not None:
         low, high = gain["interval"]
         yield ("errors", "closed share of the error", ""), Estimate(gain["closed"], low, high, "")
-    for channel in d["record"]["channels"]:
-        yield ("noise", f"noise of {channel['name']}", channel["unit"]), channel["noise"]
 
 
 def _estimate(value: Mapping[str, Any]) -> Estimate:
