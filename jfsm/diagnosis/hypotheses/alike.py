@@ -45,12 +45,18 @@ def _special_cases(cause: Cause) -> Iterator[str]:
 
 
 def _of_one_class(cause: Cause) -> Iterator[str]:
-    known = {each.id: _classes(each) for each in causes().values() if not each.is_value}
-    own = known.get(cause.id) or _classes(cause)
+    known, own = _known(), _classes(cause)
     for name in own:
+        if name in _WIDE and len(own) > 1:
+            continue
         others = [each for each, classes in known.items() if name in classes and each != cause.id]
-        if others and (name not in _WIDE or len(own) == 1):
+        if others:
             yield f"As {name} it is confused with {', '.join(others)}."
+
+
+def _known() -> dict[str, tuple[str, ...]]:
+    """The classes of every cause in the catalogue but for wrong values."""
+    return {each.id: _classes(each) for each in causes().values() if not each.is_value}
 
 
 def _classes(cause: Cause) -> tuple[str, ...]:
