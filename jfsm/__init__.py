@@ -6,6 +6,7 @@ or a record that is only read, need not wait for JAX.
 
 import ast
 from importlib import import_module
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,8 @@ __all__ = list(_ROOMS)  # pyright: ignore[reportUnsupportedDunderAll]
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return version(__name__)
     if name in _ROOMS.values() or name in _ROOMS and _ROOMS[name] is None:
         return import_module(f"{__name__}.{name}")
     if name not in _ROOMS:

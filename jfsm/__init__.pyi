@@ -3,6 +3,8 @@
 from . import paper as paper
 from . import systems as systems
 from .diagnosis import Diagnosis as Diagnosis
+from .diagnosis import Sides as Sides
+from .diagnosis import compare as compare
 from .diagnosis import diagnose as diagnose
 from .dynamics import Backbone as Backbone
 from .dynamics import FixedPoint as FixedPoint
@@ -31,6 +33,8 @@ from .records import Record as Record
 from .records import align as align
 from .records import join as join
 from .records import read as read
+from .structures import AbstractFriction as AbstractFriction
+from .structures import AbstractTerm as AbstractTerm
 from .structures import AccelerationBias as AccelerationBias
 from .structures import AccelerationGain as AccelerationGain
 from .structures import AttachedOscillator as AttachedOscillator
@@ -61,6 +65,7 @@ from .structures import LinearStiffness as LinearStiffness
 from .structures import LuGre as LuGre
 from .structures import Maxwell as Maxwell
 from .structures import Offset as Offset
+from .structures import Parameter as Parameter
 from .structures import ParametricStiffness as ParametricStiffness
 from .structures import PeriodicDisturbance as PeriodicDisturbance
 from .structures import PositionDamping as PositionDamping
@@ -70,6 +75,7 @@ from .structures import QuadraticDamping as QuadraticDamping
 from .structures import QuadraticStiffness as QuadraticStiffness
 from .structures import QuinticStiffness as QuinticStiffness
 from .structures import Saturation as Saturation
+from .structures import Scale as Scale
 from .structures import Simulation as Simulation
 from .structures import SineStiffness as SineStiffness
 from .structures import SmoothCoulomb as SmoothCoulomb
@@ -99,3 +105,5 @@ from .surrogates import Spherical as Spherical
 from .surrogates import Spline as Spline
 from .surrogates import find_discontinuities as find_discontinuities
 from .surrogates import load_map as load_map
+
+__version__: str

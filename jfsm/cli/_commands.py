@@ -25,6 +25,7 @@ from ._input import (
     takes_record,
     units,
 )
+from ._laws import OwnLaws, causes_named, run_laws
 from ._output import progress, said_in_options, say, show_listing, show_table
 
 if TYPE_CHECKING:
@@ -68,6 +69,7 @@ def simulate(
     source: RecordFile,
     model: ModelFile,
     out: Annotated[Path, option("Write the motion here, as a csv, txt, npz or mat file.")],
+    laws: OwnLaws = None,
 ) -> None:
     """Run a model freely under the force of a record, and write its motion as a record.
 
@@ -76,6 +78,7 @@ def simulate(
     from ..dynamics import simulate
 
     check_outputs({"--out": out}, [source.record, model])
+    run_laws(laws)
     record = source.read()
     response = simulate(load(model), record)
     if not response.result.ok:
@@ -93,6 +96,7 @@ def fit(
     model: ModelFile,
     out: Annotated[Path, option("Write the fitted model here, as TOML.")],
     fixed: Annotated[list[str] | None, option("What stays as it is: mass, stiffness@0-1.k; repeatable.")] = None,
+    laws: OwnLaws = None,
     out_units: ShownUnits = None,
 ) -> None:
     """Fit a model's own values to a record, or to several at once."""
@@ -101,6 +105,7 @@ def fit(
     from ..reporting import in_shown_unit, shown_in
 
     check_outputs({"--out": out}, [*source.records, model])
+    run_laws(laws)
     records, given = source.read(), load(model)
     asked = shown_units(out_units, records[0])
     with progress() as tell:
@@ -152,8 +157,13 @@ def diagnose(
     json: Annotated[Path | None, option("Write every number here, as JSON.")] = None,
     extended: Annotated[Path | None, option("Write the mended model here, as TOML; a map goes beside it.")] = None,
     cause: Annotated[
-        list[str] | None, typer.Option(help="Look for this cause (`jfsm causes` lists them); repeat for more.")
+        list[str] | None,
+        typer.Option(
+            help="Look for this cause (`jfsm causes` lists them), or for a law of your own, as mylaws.py:TanhSpring; "
+            "repeat for more."
+        ),
     ] = None,
+    laws: OwnLaws = None,
     max_causes: Annotated[int, typer.Option(help="Effects that may act at once: 1, or 2.", min=1, max=2)] = 2,
     what_next: Annotated[
         bool, typer.Option("--next", help="Also say what test would tell the two likeliest causes apart.")
@@ -176,7 +186,8 @@ def diagnose(
     given = [path for path in (model, simulated) if path is not None]
     inputs = [*source.records, *given, *(Path(text) for text in holdout or ())]
     check_outputs({"--report": report, "--json": json, "--extended": extended}, inputs)
-    records, held = source.read(), source.held_out(holdout)
+    run_laws(laws)
+    causes, records, held = causes_named(cause), source.read(), source.held_out(holdout)
     believed = None if model is None else load(model)
     run = None if simulated is None else source.read_simulated(simulated)
     units = shown_units(out_units, records[0])
@@ -185,7 +196,7 @@ def diagnose(
             records,
             believed,
             holdout=held,
-            causes=cause,
+            causes=causes,
             max_causes=max_causes,
             key=random_key(key),
             simulated=run,
@@ -217,6 +228,7 @@ def map(
     model: Annotated[Path | None, option("Map what this model lacks, as TOML; else all of the force.")] = None,
     mass: Annotated[float | None, option("Mass of a single degree of freedom, without a model.", "KG")] = None,
     at: Annotated[str | None, option("The link, where the model has several; 0 is ground.", "I-J")] = None,
+    laws: OwnLaws = None,
     method: Annotated[
         str, typer.Option(help="What learns the map: rkpm, kriging, or joint: kriging with the motion.")
     ] = "rkpm",
@@ -230,6 +242,7 @@ def map(
 
     inputs = [source.record] if model is None else [source.record, model]
     check_outputs({"--out": out, "--report": report}, inputs)
+    run_laws(laws)
     record, believed, place = source.read(), None if model is None else load(model), link(at)
     units = shown_units(out_units, record)
     with progress() as tell:
@@ -293,20 +306,6 @@ def _judged_again(d: dict[str, Any], changed: list[str]) -> dict[str, Any]:
     decision = judge_again(d, Thresholds().changed(changed))
     typer.echo(f"Judged again with {', '.join(changed)}; the file says {d['verdict']}.")
     return {"verdict": decision.verdict, "decision": decision.plain}
-
-
-@command
-def causes() -> None:
-    """List the catalogue of causes."""
-    from ..structures import causes
-
-    for family in dict.fromkeys(cause.family for cause in causes().values()):
-        rows = [
-            (cause.id, f"{', '.join(p.name for p in cause.effect.parameters)}: {cause.sentence}")
-            for cause in causes().values()
-            if cause.family == family
-        ]
-        show_table(family.capitalize(), ("cause", "parameters and what it is"), rows)
 
 
 @command

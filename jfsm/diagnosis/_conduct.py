@@ -7,7 +7,7 @@ import jax
 from .._limit import Limit
 from ..plant import Reconstruction
 from ..records import Record
-from ..structures import AbstractTerm, Cause, Structure
+from ..structures import AbstractTerm, CauseLike, Structure
 from ._diagnosis import Diagnosis
 from .advice.detection_limits import Silence, Smallest, detectable, naturally_detectable
 from .advice.next_test import Leading
@@ -39,7 +39,7 @@ def conduct(
     given: Sequence[Record],
     model: Structure,
     holdout: float | Record | Sequence[Record] | None,
-    causes: Sequence[str | Cause] | None,
+    causes: Sequence[CauseLike] | None,
     max_causes: int,
     key: jax.Array,
     places: Sequence[tuple[int, int]] | None,

@@ -12,7 +12,7 @@ from .._types import require_x64
 from ..plant import Reconstruction
 from ..records import Record
 from ..reporting import shown_by_default
-from ..structures import Cause, Runs, Structure
+from ..structures import CauseLike, Runs, Structure, check_order
 from ._conduct import conduct
 from ._diagnosis import Diagnosis
 from ._stand_in import departure, driven_alike, stand_in
@@ -26,7 +26,7 @@ def diagnose(
     record: Record | Sequence[Record],
     model: Structure | Runs | None = None,
     holdout: float | Record | Sequence[Record] | None = 0.3,
-    causes: Sequence[str | Cause] | None = None,
+    causes: Sequence[CauseLike] | None = None,
     max_causes: int = 2,
     key: jax.Array | None = None,
     *,
@@ -61,9 +61,10 @@ def diagnose(
         A share is the last part in time, unless what the model lacks shows only there: then it is the first. Where
         nothing drives the structure it is the last part of what is more than noise, run from the release. Records are
         never fitted; None decides on the whole record and gives no gain.
-    causes : sequence of ids or causes, optional
+    causes : sequence of ids, causes, laws or sensor effects, optional
         What to look for; the whole catalogue by default. Wrong own values always. Of many laws, those are fitted that
-        explain most of the force that the model lacks.
+        explain most of the force that the model lacks. A law is a class, one of your own too, or an object, which is
+        looked for at its place alone, and from its numbers as well: ``["coulomb", TanhSpring]``.
     max_causes : int
         Effects that may act at once, at most. Two are looked for where any single one leaves more than noise; more than
         two are not.
@@ -108,6 +109,7 @@ def diagnose(
     (``jax.config.update("jax_enable_compilation_cache", False)``).
     """
     require_x64()
+    check_order("jfsm.diagnose(record, model)", model, record)
     if max_causes < 1:
         raise ValueError(f"`max_causes` must be at least 1; got {max_causes}.")
     if time_limit is not None and not time_limit > 0:

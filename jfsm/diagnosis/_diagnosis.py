@@ -57,6 +57,14 @@ class Diagnosis:
     def __repr__(self) -> str:
         return f"<Diagnosis, {self.verdict}{'' if self.finished else ', not finished'}: {self.sentence}>"
 
+    def _repr_html_(self) -> str:
+        """What `print` shows, for a notebook."""
+        from html import escape
+
+        from ..reporting import diagnosis_text
+
+        return f"<pre>{escape(diagnosis_text(self.told))}</pre>"
+
     def next_tests(
         self, key: jax.Array | None = None, progress: Callable[[str, int, int], None] | None = None
     ) -> list[Proposal]:

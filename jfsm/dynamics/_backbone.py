@@ -19,7 +19,7 @@ from ._linearise import linearise_field
 from ._simulate import with_tables
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Backbone:
     """Free periodic motion of the undamped structure in one of its modes.
 
@@ -39,6 +39,33 @@ class Backbone:
     amplitude: Float[np.ndarray, " points"]
     coefficients: Float[np.ndarray, "points harmonics dof"]
     result: Result
+
+    def __repr__(self) -> str:
+        first, last = (self.frequency[[0, -1]] / (2 * np.pi)).tolist() if self.frequency.size else (np.nan, np.nan)
+        return f"<Backbone, {self.frequency.size} points from {first:.4g} to {last:.4g} Hz>"
+
+    def plot(self, ax: Any = None) -> Any:
+        """Amplitude [m] over frequency [Hz].
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            A new figure without them.
+
+        Returns
+        -------
+        matplotlib axes
+        """
+        from ..reporting import Line, PanelOf, draw_panels
+
+        line = Line("", self.frequency / (2 * np.pi), self.amplitude)
+        return draw_panels([PanelOf("frequency [Hz]", "amplitude [m]", [line])], ax)
+
+    def to_dataframe(self) -> Any:
+        """The curve as a DataFrame of pandas, which must be installed: frequency [Hz] and amplitude [m]."""
+        import pandas as pd
+
+        return pd.DataFrame({"frequency_hz": self.frequency / (2 * np.pi), "amplitude": self.amplitude})
 
 
 @programs_kept()

@@ -31,7 +31,7 @@ _BATCH = 64
 _LADDER = 12
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ForcedResponse:
     """Periodic response to amplitude·cos(ωt) along its curve, through the folds.
 
@@ -61,10 +61,56 @@ class ForcedResponse:
     folds: Int[np.ndarray, " folds"]
     result: Result
 
+    def __repr__(self) -> str:
+        low, high = (np.array([self.frequency.min(), self.frequency.max()]) / (2 * np.pi)).tolist()
+        unstable = int(np.sum(~self.stable))
+        return (
+            f"<ForcedResponse, {self.frequency.size} points from {low:.4g} to {high:.4g} Hz, {self.folds.size} folds, "
+            f"{unstable} points unstable>"
+        )
+
+    def plot(self, ax: Any = None) -> Any:
+        """Amplitude [m] over frequency [Hz], unstable parts broken.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            A new figure without them.
+
+        Returns
+        -------
+        matplotlib axes
+        """
+        from ..reporting import Line, PanelOf, draw_panels
+
+        lines = [
+            Line(f"displacement {j + 1}", self.frequency / (2 * np.pi), np.where(keep, column, np.nan), style)
+            for j, column in enumerate(self.amplitude.T)
+            for keep, style in ((_reaching(self.stable), "-"), (~self.stable, "--"))
+        ]
+        return draw_panels([PanelOf("frequency [Hz]", "amplitude [m]", lines)], ax)
+
+    def to_dataframe(self) -> Any:
+        """The curve as a DataFrame of pandas, which must be installed: frequency [Hz], amplitudes [m], phases [rad]."""
+        import pandas as pd
+
+        columns: dict[str, Any] = {"frequency_hz": self.frequency / (2 * np.pi)}
+        for j in range(self.amplitude.shape[1]):
+            columns |= {f"amplitude_{j + 1}": self.amplitude[:, j], f"phase_{j + 1}": self.phase[:, j]}
+        return pd.DataFrame({**columns, "stable": self.stable})
+
     def motion(self, point: int, samples: int = 256) -> Float[np.ndarray, "samples dof"]:
         """Displacements (samples, dof) over one period of a point, evenly spaced from where the force is largest."""
         harmonics = self.coefficients.shape[1] // 2
         return tables(harmonics, samples)[0] @ self.coefficients[point]
+
+
+def _reaching(stable: Bool[np.ndarray, " points"]) -> Bool[np.ndarray, " points"]:
+    """Stable points and their neighbours, so that the parts of a drawn curve meet."""
+    reached = stable.copy()
+    reached[1:] |= stable[:-1]
+    reached[:-1] |= stable[1:]
+    return reached
 
 
 @programs_kept()

@@ -45,7 +45,7 @@ _ESCAPED = 1e3
 _MAX_STEPS = 1 << 15
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class LimitCycle:
     """An isolated closed orbit.
 
@@ -75,6 +75,31 @@ class LimitCycle:
     orbit: Float[np.ndarray, "samples columns"]
     residual: float
     note: str
+
+    def __repr__(self) -> str:
+        sizes = ", ".join(f"{size:.4g}" for size in self.amplitude)
+        return f"<LimitCycle, {'' if self.stable else 'un'}stable, period {self.period:.6g} s, amplitude {sizes} m>"
+
+    def plot(self, ax: Any = None) -> Any:
+        """Velocity [m/s] over displacement [m] of each degree of freedom; an unstable orbit broken.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            A new figure without them.
+
+        Returns
+        -------
+        matplotlib axes
+        """
+        from ..reporting import Line, PanelOf, draw_panels
+
+        dof = self.amplitude.size
+        lines = [
+            Line(f"degree of freedom {j}", self.orbit[:, j], self.orbit[:, dof + j], "-" if self.stable else "--")
+            for j in range(1, dof + 1)
+        ]
+        return draw_panels([PanelOf("displacement [m]", "velocity [m/s]", lines)], ax)
 
 
 class Flow(eqx.Module):

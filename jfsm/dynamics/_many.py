@@ -33,7 +33,7 @@ from ..plant import (
     typical_size,
 )
 from ..records import Record
-from ..structures import MapTerm, Structure
+from ..structures import MapTerm, Structure, check_order
 from ._simulate import escapes, finer, motion_bound, with_tables
 
 _LANES = (1, 8, 64)
@@ -97,6 +97,7 @@ def simulate_many(
         If the structures differ in more than their numbers, or their number and that of the initial states differ.
     """
     require_x64()
+    check_order("jfsm.simulate_many(models, record)", models, record)
     structures = [models] if isinstance(models, Structure) else list(models)
     if not structures:
         raise ValueError("`models` must hold at least one structure; the sequence is empty.")

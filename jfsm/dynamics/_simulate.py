@@ -56,6 +56,7 @@ from ..structures import (
     MapTerm,
     Offset,
     Structure,
+    check_order,
 )
 from ..surrogates import AbstractForceStateMap, tabulate
 from ._agreement import Agreement, agreement
@@ -80,7 +81,7 @@ _BOUND = 1e6
 """A motion this many times larger than anything that was measured or could be driven has escaped."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Response:
     """Motion of a free run, in the record's datum; or an imposed motion, and the force that it needs.
 
@@ -122,6 +123,38 @@ class Response:
     agreed_until: float | None = None
     _record: Record | None = None
     _given: Any = None
+
+    def __repr__(self) -> str:
+        n, dof = self.displacement.shape
+        end = f"escaped at {self.escape_time:.6g} s" if self.escape_time is not None else f"{self.time[-1]:.6g} s"
+        return f"<Response, {n} samples of {dof} degree{'s' * (dof > 1)} of freedom, {end}, {self.solver} solver>"
+
+    def plot(self, ax: Any = None) -> Any:
+        """Displacement, velocity and acceleration over time, and the force where motion drives.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Three, or four with the force; a new figure without them.
+
+        Returns
+        -------
+        array of matplotlib axes
+        """
+        from ..reporting import Line, PanelOf, draw_panels
+
+        si = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2", "force": "N"}
+        units, panels = si if self._record is None else {**si, **self._record.units}, []
+        for kind in si:
+            values = getattr(self, kind)
+            if values is not None:
+                lines = [Line(f"{kind} {j + 1}", self.time, values[:, j]) for j in range(values.shape[1])]
+                panels.append(PanelOf("time [s]", f"{kind} [{units[kind]}]", lines))
+        return draw_panels(panels, ax)
+
+    def to_dataframe(self) -> Any:
+        """The motion as a DataFrame of pandas, which must be installed, over the instants [s]."""
+        return self.to_record().to_dataframe()
 
     def to_record(self) -> Record:
         """The run as a record, as if everything had been measured: its motion and what drove it, in its units.
@@ -253,6 +286,7 @@ def simulate(
     as they are, and the derivative is exactly that of this run. The start must be known: given, or at rest.
     """
     require_x64()
+    check_order("jfsm.simulate(model, record)", model, record)
     check_scheme(solver, tolerance)
     check_pair(model, record, imposed=True)
     record = mended(record)

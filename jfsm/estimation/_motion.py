@@ -18,7 +18,7 @@ from .._threads import small_matrices
 from .._types import require_x64
 from ..plant import check_pair, direction, lower
 from ..records import Record, mended
-from ..structures import LinearDamping, LinearStiffness, Structure
+from ..structures import LinearDamping, LinearStiffness, Structure, check_order
 from ._learning import Learned, learned, smoothed
 from ._missing import less_known
 from ._observable import Place, require_apart, require_seen
@@ -127,6 +127,7 @@ def estimate_motion(
     which slow motion drowns in noise that is integrated.
     """
     require_x64()
+    check_order("jfsm.estimate_motion(record, model)", model, record)
     if not record.responses:
         raise ValueError(
             "`record` must hold a response (displacement, velocity or acceleration); it has none to start from."

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -13,7 +14,7 @@ from .._threads import side_by_side, small_matrices
 from .._types import require_x64
 from ..plant import Reconstruction
 from ..records import Record, mended
-from ..structures import Offset, Structure, is_offset
+from ..structures import Offset, Structure, check_order, is_offset
 from ._maximise import Maximum, approach, finish
 from ._missing_links import missing_links, words_of
 from ._modes import Mode, modes_of
@@ -38,7 +39,7 @@ _LOOSE = 0.5
 """Relative standard error from which a value is hardly determined."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Fit:
     """A structure fitted to records.
 
@@ -75,6 +76,41 @@ class Fit:
     result: Result
     missing: str = ""
     modes: tuple[Mode, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<Fit, {len(self.values)} values, {self.result.value}>\n{self.structure!r}"
+
+    def to_dataframe(self) -> Any:
+        """Value, 95 % interval and unit by path, as a DataFrame of pandas, which must be installed."""
+        import pandas as pd
+
+        parameters = self.structure.entries()
+        rows = [
+            {"path": path, "value": value, "low": self.intervals[path][0], "high": self.intervals[path][1],
+             "unit": parameters[path][0].unit() if path in parameters else ""}
+            for path, value in self.values.items()
+        ]  # fmt: skip
+        return pd.DataFrame(rows).set_index("path")
+
+    def plot(self, ax: Any = None) -> Any:
+        """The 95 % intervals of the fitted values, as shares of the values [%].
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            A new figure without them.
+
+        Returns
+        -------
+        matplotlib axes
+        """
+        from ..reporting import draw_intervals
+
+        shown = {path: value for path, value in self.values.items() if value}
+        ends = [sorted(100 * (end / value - 1) for end in self.intervals[path]) for path, value in shown.items()]
+        return draw_intervals(
+            list(shown), [low for low, _ in ends], [high for _, high in ends], "95 % interval about the value [%]", ax
+        )
 
 
 @programs_kept()
@@ -118,6 +154,7 @@ def fit(
         If a name in `fixed` or `bounds` means nothing, bounds are the wrong way round, or the record cannot be used.
     """
     require_x64()
+    check_order("jfsm.fit(model, record)", model, record)
     records = [record] if isinstance(record, Record) else list(record)
     if not records:
         raise ValueError("`record` must hold at least one record; the sequence is empty.")

@@ -13,7 +13,7 @@ from .._result import Estimate
 from .._types import evenly_taken
 from ..estimation import RestoringForce, restoring_force
 from ..records import OutUnits, Record, out_units
-from ..structures import Parameter, Structure
+from ..structures import Parameter, Structure, check_order
 from ..surrogates import RKPM, Discontinuity, Kriging, find_discontinuities
 from .learned_map import LearnedMap, check_method, learn
 from .plot_data import GRID, shown_map, shown_points
@@ -134,6 +134,7 @@ def map_force(
     of a jump that was not found, as that of dry friction from displacement alone: intervals near it are too narrow.
     All this is of maps that are learned after the motion, not together with it.
     """
+    check_order("jfsm.map_force(record, model)", model, record)
     check_method(method, mass, order)
     readings = restoring_force(record, model, mass, at)
     known = np.flatnonzero(readings.std <= _UNSURE * np.median(readings.std))

@@ -70,6 +70,33 @@ class Record(AbstractRecord):
         """
         return fold(self, period, transient)
 
+    def plot(self, ax: Any = None) -> Any:
+        """The channels over time, the kinds below one another.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            As many as there are kinds of channel; a new figure without them.
+
+        Returns
+        -------
+        matplotlib axes
+            One, or an array of them.
+
+        Raises
+        ------
+        ValueError
+            If another number of axes is given.
+        """
+        from jfsm.reporting import Line, PanelOf, draw_panels
+
+        panels = []
+        for kind in dict.fromkeys(kind for kind, _ in self.channels):
+            lines = [Line(f"{kind} {j}", self.time, y) for (other, j), y in self.channels.items() if other == kind]
+            words = f"{kind.replace('_', ' ')} [{self.units[kind]}]"
+            panels.append(PanelOf(f"time [{self.units.get('time', 's')}]", words, lines))
+        return draw_panels(panels, ax)
+
     def inspect(self) -> Inspection:
         """What an engineer would want to know of the record before trusting it."""
         return inspect(self)

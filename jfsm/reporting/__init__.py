@@ -15,6 +15,11 @@ from ._page_again import read_diagnosis as read_diagnosis
 from ._page_again import render_json as render_json
 from ._pictures import pictures as pictures
 from ._pictures import plot_diagnosis as plot_diagnosis
+from ._plots import Line as Line
+from ._plots import PanelOf as PanelOf
+from ._plots import draw_intervals as draw_intervals
+from ._plots import draw_panels as draw_panels
+from ._plots import draw_surface as draw_surface
 from ._progress import bar as bar
 from ._progress import shown_by_default as shown_by_default
 from ._progress import stages as stages

@@ -3,10 +3,15 @@
 from ._catalogue import OWN_VALUE as OWN_VALUE
 from ._catalogue import PARAMETER_CAUSES as PARAMETER_CAUSES
 from ._catalogue import Cause as Cause
+from ._catalogue import CauseLike as CauseLike
 from ._catalogue import causes as causes
+from ._catalogue import causes_of as causes_of
+from ._definition import own_laws as own_laws
+from ._order import check_order as check_order
 from ._own_motion import EvaluatedMotion as EvaluatedMotion
 from ._own_motion import OwnMotion as OwnMotion
 from ._runs import Runs as Runs
+from ._sensors import SENSORS as SENSORS
 from ._sensors import AbstractSensor as AbstractSensor
 from ._sensors import AccelerationBias as AccelerationBias
 from ._sensors import AccelerationGain as AccelerationGain
@@ -26,6 +31,7 @@ from .terms import DELAYED_TERMS as DELAYED_TERMS
 from .terms import FRICTION_TERMS as FRICTION_TERMS
 from .terms import MEMORY_TERMS as MEMORY_TERMS
 from .terms import SMOOTH_TERMS as SMOOTH_TERMS
+from .terms import TERMS as TERMS
 from .terms import AttachedOscillator as AttachedOscillator
 from .terms import BilinearDamping as BilinearDamping
 from .terms import BilinearStiffness as BilinearStiffness

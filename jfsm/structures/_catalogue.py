@@ -2,8 +2,10 @@
 
 import math
 from collections.abc import Mapping
+from difflib import get_close_matches
 from typing import Any, NamedTuple
 
+from ._definition import FAMILIES
 from ._sensors import (
     AbstractSensor,
     AccelerationBias,
@@ -14,7 +16,7 @@ from ._sensors import (
     ForceGain,
 )
 from ._structure import MASS, Structure
-from ._term import Parameter
+from ._term import AbstractFriction, AbstractTerm, Parameter
 from .terms import (
     AttachedOscillator,
     BilinearDamping,
@@ -57,7 +59,8 @@ from .terms import (
 class Cause(NamedTuple):
     """One entry: a law or a sensor effect, its sign, and its sentence.
 
-    `sign` is +1 or -1 where the cause is one sign of the law, 0 where both are the same cause.
+    `sign` is +1 or -1 where the cause is one sign of the law, 0 where both are the same cause. `examples` are places
+    and numbers of the law to begin from; where there are any, it is looked for at these places alone.
     """
 
     id: str
@@ -66,6 +69,7 @@ class Cause(NamedTuple):
     effect: type[Any]
     sign: int
     sentence: str
+    examples: tuple[tuple[tuple, tuple[float, ...]], ...] = ()
 
     @property
     def is_sensor(self) -> bool:
@@ -80,6 +84,10 @@ class Cause(NamedTuple):
     def has_sign_of(self, first: float) -> bool:
         """Whether a number, the first of a law, has the sign of this cause; any has that of one with both."""
         return not self.sign or math.copysign(1, first) == self.sign
+
+    def examples_at(self, at: tuple) -> list[Any]:
+        """The terms at a place that a search begins from as well."""
+        return [self.effect(*numbers, at=at) for place, numbers in self.examples if place == at]
 
     def term(self, at: tuple, **parameters: float) -> Any:
         """The term (or sensor effect) with these numbers.
@@ -121,6 +129,10 @@ class Cause(NamedTuple):
         if set(parameters) != set(names):
             raise TypeError(f"{self.id} takes {', '.join(names)}; got {', '.join(parameters) or 'nothing'}.")
         return names[0], parameters[names[0]]
+
+
+CauseLike = str | Cause | type[AbstractTerm] | type[AbstractSensor] | AbstractTerm | AbstractSensor
+"""What may be named as a cause: an id, a cause, a law or a sensor's fault as a class or as an object."""
 
 
 class _Mass:
@@ -239,3 +251,63 @@ PARAMETER_CAUSES = {"stiffness": "stiffness_value", "damping": "damping_value", 
 def causes() -> Mapping[str, Cause]:
     """Every cause that `diagnose` can name, by its id."""
     return {cause.id: cause for cause in _CAUSES}
+
+
+def causes_of(item: CauseLike) -> list[Cause]:
+    """The causes that an id, a cause, a law or a sensor effect stands for.
+
+    A law is a class or an object; it may be one of the user's own. An object is looked for at its place alone, and from
+    its numbers as well. A law of which either sign has its own entry stands for both; an object for that of its sign.
+
+    Raises
+    ------
+    ValueError
+        If it is no cause, or a law whose family cannot be told.
+    """
+    known = causes()
+    if isinstance(item, Cause):
+        return [item]
+    if isinstance(item, str) and item in known:
+        return [known[item]]
+    law = item if isinstance(item, type) else type(item)
+    if not issubclass(law, AbstractTerm | AbstractSensor):
+        raise ValueError(_no_cause(item, known))
+    found = [each for each in known.values() if each.effect is law and not each.is_value] or [_of_own(law)]
+    if isinstance(item, str | type):
+        return found
+    numbers = tuple(float(getattr(item, p.name)) for p in law.parameters)
+    example = ((item.at, numbers),)
+    return [each._replace(examples=example) for each in found if each.has_sign_of(numbers[0])]
+
+
+def _no_cause(item: Any, known: Mapping[str, Cause]) -> str:
+    close = get_close_matches(item, known, 1) if isinstance(item, str) else []
+    meant = f"Did you mean {close[0]}? " if close else ""
+    return (
+        "`causes` must name causes of the catalogue, or be laws such as jfsm.Coulomb or one of your own; got "
+        f"{item!r}. {meant}The catalogue holds {', '.join(known)}."
+    )
+
+
+def _of_own(law: Any) -> Cause:
+    """The cause that a law outside the catalogue is."""
+    if law.__abstractmethods__ or not issubclass(law, AbstractTerm) or not law.parameters:
+        raise ValueError(f"`causes` must hold laws with numbers of their own; got {law.__name__}.")
+    family = law.family or _family_of(law)
+    if not family:
+        raise ValueError(
+            f"`family` of {law.__name__} must be one of {', '.join(FAMILIES)} for it to be a cause; write e.g. "
+            'family = "stiffness" in the class.'
+        )
+    if law.kind in causes():
+        raise ValueError(f"`kind` of {law.__name__} must not be the id of a cause in the catalogue; got {law.kind!r}.")
+    words = (law.__doc__ or "").strip().partition("\n")[0].rstrip(".")
+    label = law.label or law.kind.replace("_", " ")
+    return Cause(law.kind, family, label, law, law.sign, words or label)
+
+
+def _family_of(law: type[AbstractTerm]) -> str:
+    """What a law that says nothing counts as, where what it is tells; else empty."""
+    if issubclass(law, AbstractFriction):
+        return "damping"
+    return "memory" if law.states or law.delay is not AbstractTerm.delay else "time" if law.timed else ""

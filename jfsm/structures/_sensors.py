@@ -7,6 +7,7 @@ import equinox as eqx
 
 from .._types import as_scalar, is_traced
 from ._term import ABOVE_ZERO, Parameter, Scalar
+from ._written import part_text
 
 CHANNEL_KINDS = ("force", "displacement", "velocity", "acceleration")
 RESPONSES = CHANNEL_KINDS[1:]
@@ -41,6 +42,9 @@ class AbstractSensor(eqx.Module):
         """The effect's one number: a float, unless it is being traced."""
         number = getattr(self, self.parameters[0].name)
         return number if is_traced(number) else float(number)
+
+    def __repr__(self) -> str:
+        return part_text(self)
 
     def __check_init__(self):
         if self.at[0] not in self.channels or self.at[1] < 1:

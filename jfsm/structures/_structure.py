@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -14,6 +15,7 @@ from jaxtyping import Array, Float
 from .._types import as_array, as_numbers, is_traced
 from ._own_motion import EvaluatedMotion, OwnMotion
 from ._sensors import AbstractSensor
+from ._shown import structure_text
 from ._term import AbstractTerm, Parameter
 from .terms import LinearDamping, LinearStiffness
 
@@ -78,6 +80,12 @@ class Structure(eqx.Module):
                 raise ValueError(
                     f"`at`={sensor.at} of {sensor.kind} names a degree of freedom beyond the structure's {self.dof}."
                 )
+
+    def __repr__(self) -> str:
+        try:
+            return structure_text(self)
+        except (AttributeError, TypeError, jax.errors.JAXTypeError):  # amid a transformation it may hold anything
+            return eqx.tree_pformat(self)
 
     @classmethod
     def sdof(cls, mass: float, stiffness: float, damping: float = 0.0) -> "Structure":

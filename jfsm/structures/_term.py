@@ -1,120 +1,78 @@
 """The term contract: everything on the left-hand side of the equation of motion is a term."""
 
 import abc
-import math
-import operator
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, dataclass_transform
 
 import equinox as eqx
 import jax.numpy as jnp
-from jax.core import Tracer
 from jaxtyping import Array, Float
 
+from ._definition import checked, completed
+from ._parameter import ABOVE_ZERO as ABOVE_ZERO
+from ._parameter import Parameter as Parameter
+from ._parameter import Scale as Scale
+from ._parameter import as_link as as_link
+from ._written import part_text
+
 Scalar = Float[Array, ""]
-
-
-ABOVE_ZERO = 1e-300
-"""`Parameter.least` of a number that a law divides by."""
-
-
-class Parameter(NamedTuple):
-    """One number of a law.
-
-    `force`, `length` and `time` are the exponents of its unit: N/m³ is ``force=1, length=-3``. Those of length and time
-    count as often as the law's number named `exponent` says: 1/mⁿ is ``length=-1, exponent="n"``. A fit keeps the
-    number between `low` and `high`, in logarithms if it is `positive`, and leaves it alone if it is not `free` (a side,
-    an origin of time). A value below `least` is refused. One that may have either sign has the `usual` one as a rule.
-    """
-
-    name: str
-    force: int = 0
-    length: int = 0
-    time: int = 0
-    positive: bool = True
-    meaning: str = ""
-    low: float = -math.inf
-    high: float = math.inf
-    least: float = -math.inf
-    free: bool = True
-    exponent: str = ""
-    usual: int = 0
-
-    def check(self, value: Any, owner: str) -> None:
-        """Refuse a value below `least`; one that is being traced cannot be looked at."""
-        if isinstance(value, Tracer) or float(value) >= self.least:
-            return
-        must = "be positive" if self.least > 0 else "not be negative"
-        raise ValueError(f"`{self.name}` of {owner} must {must}; got {float(value):g}.")
-
-    def unit(self, force: str = "N", length: str = "m", time: str = "s") -> str:
-        """The unit in words, ``"N/m^3"``, from the record's unit of force and of length."""
-        if self.exponent:
-            over = self._replace(force=0, exponent="").unit(force, length, time)
-            over = f"{over}^{self.exponent}" if over.startswith("1/") else f"({over})^{self.exponent}"
-            return f"{force} {over}" if self.force else over
-        if (self.force, self.length, self.time, force, length, time) == (1, -1, 2, "N", "m", "s"):
-            return "kg"
-        powers = [(force, self.force), (length, self.length), (time, self.time)]
-        above = [name if p == 1 else f"{name}^{p}" for name, p in powers if p > 0]
-        below = [name if p == -1 else f"{name}^{-p}" for name, p in powers if p < 0]
-        if not above and not below:
-            return "1"
-        top = " ".join(above) or "1"
-        return top if not below else f"{top}/{below[0]}" if len(below) == 1 else f"{top}/({' '.join(below)})"
-
-
-def as_link(at: Any) -> tuple[int, int]:
-    """A pair (i, j) of two different degrees of freedom; 0 is ground."""
-    try:
-        i, j = (operator.index(a) for a in at)
-    except (TypeError, ValueError):
-        raise ValueError(f"`at` must be a pair (i, j) of degrees of freedom, 0 for ground; got {at!r}.") from None
-    if i < 0 or j < 0 or i == j:
-        raise ValueError(f"`at` must name two different degrees of freedom, 0 for ground; got {at!r}.")
-    return i, j
-
-
-class Scale(NamedTuple):
-    """Sizes of a motion, which a law's numbers are natural to.
-
-    `force` is the rms of the elastic force, `length` the rms of the displacement, `peak` its largest value, `omega` the
-    angular frequency [rad/s], `begin` and `end` the record's first and last instant.
-    """
-
-    force: float
-    length: float
-    peak: float
-    omega: float
-    begin: float
-    end: float
-
-    def of(self, parameter: Parameter) -> float:
-        """Natural size of a number by its unit."""
-        return self.force**parameter.force * self.length**parameter.length * self.omega**-parameter.time
-
-    @property
-    def speed(self) -> float:
-        return self.length * self.omega
-
-    def instants(self, count: int) -> list[float]:
-        """So many instants inside the record, evenly spread."""
-        return [self.begin + (i + 1) / (count + 1) * (self.end - self.begin) for i in range(count)]
 
 
 Numbers = dict[str, float]
 
 
-class AbstractTerm(eqx.Module):
+@dataclass_transform(field_specifiers=(eqx.field,))
+class _Law(type(eqx.Module)):
+    """A class of laws is looked at as soon as it is defined."""
+
+    def __init__(cls, *given: Any, **options: Any):
+        super().__init__(*given, **options)
+        checked(cls)
+
+
+class AbstractTerm(eqx.Module, metaclass=_Law):
     """A force on the link ``at=(i, j)``, restoring side positive: it resists d = x_j - x_i and w = v_j - v_i.
 
-    A concrete term lists its numbers as fields, in the order of `parameters`, and then `at`. One with a memory says how
-    many hidden `states` it has, and gives `state_rate` and, where they do not begin at zero, `initial_state`; where a
-    hidden state is confined, `settle` puts it back at the end of a step. One that acts on the past gives `delay`.
+    A law of your own derives from it, lists its `parameters`, and gives the `force`, written with ``jax.numpy``; the
+    numbers are then its attributes, and the class is called with them and with the place, ``at=(i, j)``. One with a
+    memory says how many hidden `states` it has, and gives `state_rate` and, where they do not begin at zero,
+    `initial_state`; where a hidden state is confined, `settle` puts it back at the end of a step. One that acts on the
+    past gives `delay`. For friction that sticks there is `AbstractFriction`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Where the class is defined: if a parameter has no unit or no usable name, `kind` is taken, a method takes or
+        gives something else than a law's does, or JAX cannot trace it.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp, jfsm
+    >>> class TanhSpring(jfsm.AbstractTerm):
+    ...     '''A spring that saturates smoothly, force F·tanh(d/s).'''
+    ...     family, label, sign = "stiffness", "a smoothly saturating spring", 1
+    ...     parameters = (
+    ...         jfsm.Parameter("F", unit="N", meaning="largest force"),
+    ...         jfsm.Parameter("s", unit="m", meaning="displacement at which it turns over"),
+    ...     )
+    ...     def force(self, d, w, z, t):
+    ...         return self.F * jnp.tanh(d / self.s)
+    >>> model = jfsm.Structure.sdof(1.0, 100.0, 0.5) + TanhSpring(2.0, 0.01, at=(0, 1))
     """
 
     at: eqx.AbstractVar[tuple[int, int]]
     kind: ClassVar[str]
-    """First part of the path of its parameters, ``coulomb`` in ``coulomb@0-1.F``."""
+    """First part of the path of its parameters, ``coulomb`` in ``coulomb@0-1.F``, and its name in a model file; by
+    default the class's own name in small letters, ``tanh_spring``."""
+    family: ClassVar[str] = ""
+    """What it counts as where a diagnosis looks for it: ``"stiffness"``, ``"damping"``, ``"memory"``, ``"time"`` or
+    ``"input"``. Friction, laws with hidden states and those of the time need not say it."""
+    label: ClassVar[str] = ""
+    """What a verdict calls it, ``"a cubic hardening spring"``; by default its kind."""
+    classes: ClassVar[tuple[str, ...]] = ()
+    """Classes of laws that it belongs to by what it is, ``("dry friction",)``. Those of springs and dampers without a
+    memory come from the curve of their force."""
+    sign: ClassVar[int] = 0
+    """Sign of its first parameter where it is a cause; 0 where it may have either."""
     parameters: ClassVar[tuple[Parameter, ...]]
     states: ClassVar[int] = 0
     hangs: ClassVar[bool] = False
@@ -127,6 +85,13 @@ class AbstractTerm(eqx.Module):
     """Whether it may be all of a spring, so that it takes the place of a linear one, and not only add to it."""
     base: ClassVar[tuple[float, ...]] = ()
     """Share of the base's acceleration that each hidden state loses: 1 for the velocity of a mass of its own."""
+
+    def __init_subclass__(cls, **options: Any):
+        super().__init_subclass__(**options)
+        completed(cls)
+
+    def __repr__(self) -> str:
+        return part_text(self)
 
     def __check_init__(self):
         for parameter in self.parameters:

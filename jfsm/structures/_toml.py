@@ -2,8 +2,10 @@
 
 import io
 import os
+import re
 import tomllib
 from collections.abc import Callable
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,11 +14,16 @@ import tomli_w
 
 from .._map_reader import read_map
 from ..reporting import write_atomically
+from ._definition import own_laws
 from ._sensors import SENSORS
 from .terms import TERMS, MapTerm
 
 if TYPE_CHECKING:
     from ._structure import Structure
+
+_NUMBER = r"[-+.\w]+"
+_LIST = re.compile(rf"\[\n(?:\s+{_NUMBER},\n)+\s*\]")
+"""A list of numbers that takes a line for each of them."""
 
 
 def save(structure: "Structure", path: str | Path) -> None:
@@ -71,7 +78,7 @@ def _text(structure: "Structure", beside: Callable[[MapTerm], str]) -> str:
                 raise ValueError(f"A structure with a {part.kind} cannot be written as TOML: it has no numbers.")
         if rows:
             data[key] = rows
-    return tomli_w.dumps(data)
+    return _LIST.sub(lambda found: f"[{', '.join(re.findall(_NUMBER, found[0]))}]", tomli_w.dumps(data))
 
 
 def _written(term: MapTerm) -> bytes:
@@ -128,7 +135,7 @@ def loads(text: str, target: Path) -> "Structure":
         raise ValueError(f"{target}: `mass` is missing; write e.g. mass = [1.0].")
     terms, sensors = (
         [_part(row, classes, target, f"{target}, {key} {n}") for n, row in enumerate(_rows(data, key, target), 1)]
-        for key, classes in (("term", (*TERMS, MapTerm)), ("sensor", SENSORS))
+        for key, classes in (("term", (*TERMS, MapTerm, *own_laws().values())), ("sensor", SENSORS))
     )
     trust = data.get("uncertain", {})
     if not isinstance(trust, dict) or not all(type(share) in (int, float) for share in trust.values()):
@@ -151,7 +158,11 @@ def _part(row: dict[str, Any], classes: tuple[type, ...], target: Path, where: s
     row = dict(row)
     kind, at = row.pop("kind", None), row.pop("at", None)
     if kind not in kinds:
-        raise ValueError(f"{where}: `kind` must be one of {', '.join(kinds)}; got {kind!r}.")
+        close = [f"Did you mean {near}? " for near in get_close_matches(str(kind), kinds, 1)]
+        raise ValueError(
+            f"{where}: `kind` must be one of {', '.join(kinds)}; got {kind!r}. {''.join(close)}A law of your own is "
+            "known once its class is defined: import its file first."
+        )
     names = ["file"] if kind == MapTerm.kind else [p.name for p in kinds[kind].parameters]
     if set(row) != set(names):
         raise ValueError(f"{where}: {kind} takes {', '.join(names)}; got {', '.join(row) or 'nothing'}.")

@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 from .._types import as_array
 from ..structures import MapTerm
 
+_DRAWN = 81
+"""Points along each column of a picture."""
+
 
 class AbstractForceStateMap(eqx.Module):
     """A model of the restoring force over the states that were visited.
@@ -23,6 +26,39 @@ class AbstractForceStateMap(eqx.Module):
     map was learned from force of shape (n,), and the axis `outputs` where it was (n, outputs). The unit of the force is
     that of the readings; a derivative is per unit of the columns.
     """
+
+    def plot(self, ax: Any = None, *, labels: tuple[str, str, str] = ("displacement", "velocity", "force")) -> Any:
+        """The force in colours over a state of two columns, within the box that was visited.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            A new figure without them.
+        labels : (str, str, str)
+            What stands along the columns and beside the colours, units included: a map does not know its units.
+
+        Returns
+        -------
+        matplotlib axes
+
+        Raises
+        ------
+        ValueError
+            If states do not have two columns, or there are several outputs.
+        """
+        from ..reporting import draw_surface
+
+        if self.dim != 2:
+            raise ValueError(f"A map can be drawn over states of 2 columns; this one has {self.dim}.")
+        low, high = np.asarray(self.box)
+        x, y = np.linspace(low, high, _DRAWN, axis=-1)
+        states = np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)
+        force = np.asarray(self.evaluate(states))
+        if force.ndim > 1:
+            raise ValueError(
+                f"A map can be drawn where its force is one number; this one has {force.shape[1]} outputs."
+            )
+        return draw_surface(x, y, force.reshape(_DRAWN, _DRAWN), labels, ax)
 
     @property
     @abc.abstractmethod

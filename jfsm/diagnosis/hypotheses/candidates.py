@@ -1,15 +1,18 @@
 """Candidates for a diagnosis: every cause at every place where it could sit, with its starts."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
 
 from ..._threads import side_by_side
 from ...estimation import Latent
 from ...identification import Nuisances
 from ...structures import (
+    AbstractSensor,
+    AbstractTerm,
     AccelerationBias,
     AccelerationGain,
     Cause,
+    CauseLike,
     ChannelDelay,
     Clipping,
     CoulombAsymmetric,
@@ -19,6 +22,7 @@ from ...structures import (
     Preload,
     Structure,
     causes,
+    causes_of,
 )
 from .candidate import Candidate
 from .effect import Effect
@@ -33,25 +37,21 @@ _GAINS = (ForceGain, AccelerationGain)
 """Faults that a clipped channel hides: below its limit noise makes it smaller."""
 
 
-def chosen_causes(selection: Sequence[str | Cause] | None) -> dict[str, Cause]:
-    """The causes to try, by id; wrong own values are always tried.
+def chosen_causes(selection: Iterable[CauseLike] | CauseLike | None) -> dict[str, Cause]:
+    """The causes to try, by id, with the examples of all that are the same; wrong own values are always tried.
 
     Raises
     ------
     ValueError
-        If an id is not in the catalogue.
+        If an id is not in the catalogue, or a law cannot be a cause.
     """
-    known = dict(causes())
-    found = {}
-    for item in known if selection is None else selection:
-        if isinstance(item, Cause):
-            found[item.id] = item
-        elif item in known:
-            found[item] = known[item]
-        else:
-            raise ValueError(
-                f"`causes` must name causes of the catalogue ({', '.join(known)}) or be causes; got {item!r}."
-            )
+    found: dict[str, Cause] = {}
+    if selection is None:
+        selection = list(causes())
+    for item in [selection] if isinstance(selection, str | Cause | type | AbstractTerm | AbstractSensor) else selection:
+        for cause in causes_of(item):
+            examples = found[cause.id].examples + cause.examples if cause.id in found else cause.examples
+            found[cause.id] = cause._replace(examples=examples)
     return {name: cause for name, cause in found.items() if not cause.is_value}
 
 
@@ -81,7 +81,9 @@ def _fitted(selection: Mapping[str, Cause], *, imposed: bool) -> list[Cause]:
 
 
 def _links(cause: Cause, model: Structure, places: Sequence[tuple] | None) -> list[tuple]:
-    """Places of a law: the links; the masses if it hangs on one or loads it from outside."""
+    """Places of a law: those of its examples; the links; the masses if it hangs on one or loads it from outside."""
+    if cause.examples:
+        return list(dict.fromkeys(at for at, _ in cause.examples))
     if cause.effect in (LinearStiffness, LinearDamping):
         return _among(places, model.untied(cause.effect))
     masses = [(0, j) for j in range(1, model.dof + 1)]

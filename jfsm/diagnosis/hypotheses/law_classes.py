@@ -11,36 +11,68 @@ import numpy as np
 
 from ...plant import force_at
 from ...structures import AbstractSensor, AbstractTerm, BoucWen, Cause, FreePlay, LinearDamping, LinearStiffness
+from ...structures.law_classes import (
+    AMPLITUDE as AMPLITUDE,
+)
+from ...structures.law_classes import (
+    CHANGE as CHANGE,
+)
+from ...structures.law_classes import (
+    CHANGING_STIFFNESS as CHANGING_STIFFNESS,
+)
+from ...structures.law_classes import (
+    DAMPING as DAMPING,
+)
+from ...structures.law_classes import (
+    DELAY as DELAY,
+)
+from ...structures.law_classes import (
+    FASTER as FASTER,
+)
+from ...structures.law_classes import (
+    FRICTION as FRICTION,
+)
+from ...structures.law_classes import (
+    HARDENING as HARDENING,
+)
+from ...structures.law_classes import (
+    HYSTERESIS as HYSTERESIS,
+)
+from ...structures.law_classes import (
+    LINK as LINK,
+)
+from ...structures.law_classes import (
+    LOAD as LOAD,
+)
+from ...structures.law_classes import (
+    MEMORY as MEMORY,
+)
+from ...structures.law_classes import (
+    NARROWEST_FIRST as NARROWEST_FIRST,
+)
+from ...structures.law_classes import (
+    PLAY as PLAY,
+)
+from ...structures.law_classes import (
+    SENSOR as SENSOR,
+)
+from ...structures.law_classes import (
+    SOFTENING as SOFTENING,
+)
+from ...structures.law_classes import (
+    SPRING as SPRING,
+)
+from ...structures.law_classes import (
+    TWO_SIDED as TWO_SIDED,
+)
+from ...structures.law_classes import (
+    TWO_WAYS as TWO_WAYS,
+)
 from ..thresholds import THRESHOLDS
 from .curves import bent, growth
 
 _POINTS = 41
 """Points along displacement and velocity at which a law is looked at."""
-
-PLAY = "a spring with play or a stop"
-FRICTION = "dry friction"
-HYSTERESIS = "a spring that yields"
-HARDENING = "a hardening spring"
-SOFTENING = "a softening spring"
-TWO_SIDED = "a spring that differs between its two sides"
-FASTER = "damping that grows faster than speed"
-TWO_WAYS = "damping that differs between the two directions"
-AMPLITUDE = "damping that grows with amplitude"
-LINK = "a link that the model lacks"
-SPRING = "a nonlinear spring"
-DAMPING = "nonlinear damping"
-MEMORY = "a force with memory"
-CHANGING_STIFFNESS = "a stiffness that changes with time"
-CHANGE = "a change with time"
-LOAD = "an unmeasured load"
-DELAY = "a delay between sensors"
-SENSOR = "a fault of a sensor"
-
-NARROWEST_FIRST = (
-    LINK, PLAY, FRICTION, HYSTERESIS, HARDENING, SOFTENING, TWO_SIDED, FASTER, TWO_WAYS, AMPLITUDE, CHANGING_STIFFNESS,
-    DELAY, SPRING, DAMPING, MEMORY, CHANGE, LOAD, SENSOR,
-)  # fmt: skip
-"""Every class, by how much it says."""
 
 _WIDEST = {"stiffness": SPRING, "damping": DAMPING, "memory": MEMORY, "time": CHANGE, "input": LOAD, "sensor": SENSOR}
 """The class of all laws of a family."""
@@ -72,7 +104,7 @@ def classes_of(cause: Cause, part: AbstractTerm | AbstractSensor, peak: float, s
     """The classes of a law or a sensor's fault, the narrowest first, for motions up to `peak` and `speed`."""
     if cause.effect in (LinearStiffness, LinearDamping):
         return (LINK,)
-    found = {_WIDEST[cause.family], *_BY_LAW.get(cause.id, ())}
+    found = {_WIDEST[cause.family], *_BY_LAW.get(cause.id, ()), *getattr(cause.effect, "classes", ())}
     if cause.family in ("stiffness", "damping") and isinstance(part, AbstractTerm):
         found.update(_by_curve(part, peak, speed))
     if isinstance(part, BoucWen) and part.beta + part.gamma > 0:  # its force ends at a largest value, as friction does

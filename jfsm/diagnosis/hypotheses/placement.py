@@ -96,9 +96,10 @@ class Laws:
     def candidate(self, effect: Effect) -> Candidate:
         """The law from where it explains most, and from its natural sizes."""
         placed = self.placed(effect)
-        starts = [self.structure + start.term for start in placed[:SHAPES] if start.share is not None]
+        starts = [self.structure + term for term in effect.cause.examples_at(effect.at)]
+        starts += [self.structure + start.term for start in placed[:SHAPES] if start.share is not None]
         starts += [self.structure + term for term in self._otherwise_directed(placed)]
-        starts += [self.structure + term for term in self.natural(effect)][: SHAPES - len(starts)]
+        starts += [self.structure + term for term in self.natural(effect)][: max(SHAPES - len(starts), 0)]
         return Candidate((effect,), tuple(starts), placed[0].share if placed else 0.0)
 
     def natural(self, effect: Effect) -> list[AbstractTerm]:

@@ -1,0 +1,26 @@
+"""Names of the classes of laws: what a verdict can be sure of where it cannot tell the law."""
+
+PLAY = "a spring with play or a stop"
+FRICTION = "dry friction"
+HYSTERESIS = "a spring that yields"
+HARDENING = "a hardening spring"
+SOFTENING = "a softening spring"
+TWO_SIDED = "a spring that differs between its two sides"
+FASTER = "damping that grows faster than speed"
+TWO_WAYS = "damping that differs between the two directions"
+AMPLITUDE = "damping that grows with amplitude"
+LINK = "a link that the model lacks"
+SPRING = "a nonlinear spring"
+DAMPING = "nonlinear damping"
+MEMORY = "a force with memory"
+CHANGING_STIFFNESS = "a stiffness that changes with time"
+CHANGE = "a change with time"
+LOAD = "an unmeasured load"
+DELAY = "a delay between sensors"
+SENSOR = "a fault of a sensor"
+
+NARROWEST_FIRST = (
+    LINK, PLAY, FRICTION, HYSTERESIS, HARDENING, SOFTENING, TWO_SIDED, FASTER, TWO_WAYS, AMPLITUDE, CHANGING_STIFFNESS,
+    DELAY, SPRING, DAMPING, MEMORY, CHANGE, LOAD, SENSOR,
+)  # fmt: skip
+"""Every class, by how much it says."""
