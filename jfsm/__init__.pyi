@@ -3,7 +3,9 @@
 from . import paper as paper
 from . import systems as systems
 from .diagnosis import Diagnosis as Diagnosis
+from .diagnosis import Verification as Verification
 from .diagnosis import diagnose as diagnose
+from .diagnosis import verify as verify
 from .dynamics import Backbone as Backbone
 from .dynamics import FixedPoint as FixedPoint
 from .dynamics import ForcedResponse as ForcedResponse
@@ -23,6 +25,8 @@ from .estimation import RestoringForce as RestoringForce
 from .estimation import estimate_force_map as estimate_force_map
 from .estimation import estimate_motion as estimate_motion
 from .estimation import restoring_force as restoring_force
+from .fleet import Batch as Batch
+from .fleet import diagnose_many as diagnose_many
 from .identification import Fit as Fit
 from .identification import fit as fit
 from .mapping import MappedForce as MappedForce

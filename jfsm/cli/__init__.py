@@ -7,7 +7,7 @@ Whatever is slow to import is imported by the command that needs it.
 import os
 import sys
 
-from . import _commands  # noqa: F401  (its commands are part of the program)
+from . import _commands, _fleet  # noqa: F401  (their commands are part of the program)
 from ._command import NOT_FINISHED, app
 
 __all__ = ["app", "main"]

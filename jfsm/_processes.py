@@ -1,0 +1,97 @@
+"""Work in processes of our own: they end with the one that began them, and one that dies takes one item along."""
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from typing import TypeVar
+
+Item = TypeVar("Item")
+Outcome = TypeVar("Outcome")
+
+
+class DiedError(RuntimeError):
+    """The process of a record ended, twice or by itself, without an outcome."""
+
+
+def in_processes(
+    do: Callable[[Item], Outcome], items: Sequence[Item], jobs: int
+) -> Generator[tuple[Item, Outcome | DiedError], None, None]:
+    """What `do` makes of each item in `jobs` processes, as it comes; `do` and the items must be picklable.
+
+    Every process has one item at a time. If one dies, the items that were under way are tried again one by one, each in
+    a process of its own: one with which that dies, too, has a `DiedError` for an outcome.
+    """
+    alone = list[Item]()
+    waiting = deque(items)
+    while waiting:
+        yield from _until_one_dies(do, waiting, alone, jobs)
+    for item in alone:
+        again = deque([item])
+        died = list[Item]()
+        yield from _until_one_dies(do, again, died, 1)
+        for one in died:
+            yield (
+                one,
+                DiedError(
+                    "Its process ended without a word, as it does when memory is short. Fewer --jobs leave more of it."
+                ),
+            )
+
+
+def _until_one_dies(
+    do: Callable[[Item], Outcome], waiting: deque[Item], died: list[Item], jobs: int
+) -> Generator[tuple[Item, Outcome], None, None]:
+    """Outcomes of what is waiting until nothing is, or until a process dies with what was under way then."""
+    reader, writer = multiprocessing.get_context("spawn").Pipe(duplex=False)
+    pool = ProcessPoolExecutor(
+        min(jobs, len(waiting)), multiprocessing.get_context("spawn"), initializer=_begin, initargs=(reader,)
+    )
+    under_way: dict[Future[Outcome], Item] = {}
+    try:
+        while (waiting or under_way) and not died:
+            while waiting and len(under_way) < jobs:
+                item = waiting.popleft()
+                try:
+                    under_way[pool.submit(do, item)] = item
+                except BrokenProcessPool:  # none so much as began
+                    died.append(item)
+                    break
+            done, _ = wait(under_way, return_when=FIRST_COMPLETED)
+            for future in done:
+                item = under_way.pop(future)
+                try:
+                    outcome = future.result()
+                except BrokenProcessPool:
+                    died.append(item)
+                else:
+                    yield item, outcome
+        died.extend(under_way.values())
+        under_way.clear()
+    finally:
+        if under_way or died:
+            writer.close()  # ends the processes at once
+            pool.shutdown(wait=False, cancel_futures=True)
+        else:
+            pool.shutdown()
+            writer.close()
+        reader.close()
+
+
+def _begin(reader: Connection) -> None:
+    """A process that ends when that which began it does, or when it is told to; interrupts are that one's business."""
+    with suppress(ValueError):
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(reader,), daemon=True).start()
+
+
+def _end_with(reader: Connection) -> None:
+    with suppress(EOFError, OSError):
+        reader.recv()  # nothing is ever sent: it returns when the other end is closed
+    os._exit(1)
