@@ -31,11 +31,9 @@ def in_processes(
     alone = list[Item]()
     waiting = deque(items)
     while waiting:
-        yield from _until_one_dies(do, waiting, alone, jobs)
+        alone += yield from _until_one_dies(do, waiting, jobs)
     for item in alone:
-        again = deque([item])
-        died = list[Item]()
-        yield from _until_one_dies(do, again, died, 1)
+        died = yield from _until_one_dies(do, deque([item]), 1)
         for one in died:
             yield (
                 one,
@@ -46,9 +44,10 @@ def in_processes(
 
 
 def _until_one_dies(
-    do: Callable[[Item], Outcome], waiting: deque[Item], died: list[Item], jobs: int
-) -> Generator[tuple[Item, Outcome], None, None]:
-    """Outcomes of what is waiting until nothing is, or until a process dies with what was under way then."""
+    do: Callable[[Item], Outcome], waiting: deque[Item], jobs: int
+) -> Generator[tuple[Item, Outcome], None, list[Item]]:
+    """Outcomes of what is waiting until nothing is, or until a process dies; returns what was under way then."""
+    died = list[Item]()
     reader, writer = multiprocessing.get_context("spawn").Pipe(duplex=False)
     pool = ProcessPoolExecutor(
         min(jobs, len(waiting)), multiprocessing.get_context("spawn"), initializer=_begin, initargs=(reader,)
@@ -82,6 +81,7 @@ def _until_one_dies(
             pool.shutdown()
             writer.close()
         reader.close()
+    return died
 
 
 def _begin(reader: Connection) -> None:

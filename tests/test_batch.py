@@ -342,11 +342,11 @@ def test_a_model_that_cannot_travel_is_refused_before_any_work(files, tmp_path):
 def test_kills_at_random_moments_lose_double_and_halve_nothing(tmp_path):
     script = Path(__file__).resolve().parents[1] / "benchmarks" / "trust.py"
     run = subprocess.run(
-        [sys.executable, str(script), "--kills", "6", "--records", "12"],
+        [sys.executable, str(script), "--kills", "4", "--records", "8"],
         capture_output=True, text=True, timeout=300, env={**os.environ, "TMPDIR": str(tmp_path)},
     )  # fmt: skip
     assert run.returncode == 0, run.stdout + run.stderr
-    assert "6 kills" in run.stdout and "lost 0, made again 0, cut short 0" in run.stdout
+    assert "4 kills" in run.stdout and "lost 0, made again 0, cut short 0" in run.stdout
 
 
 @pytest.mark.slow

@@ -139,9 +139,7 @@ def diagnose(
         holdout=holdout, causes=causes, max_causes=max_causes, since=since, until=until, places=places,
         reconstruction=reconstruction, time_limit=time_limit,
     )  # fmt: skip
-    held = () if holdout is None or isinstance(holdout, int | float) else records_of(holdout)
-    given = () if simulated is None else records_of(simulated)
-    made = provenance(whole, believed, key, settings, holdout=held, simulated=given)
+    made = provenance(whole, believed, key, settings, holdout=holdout, simulated=simulated)
     return replace(d, told={**d.told, "provenance": made})
 
 

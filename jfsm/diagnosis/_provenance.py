@@ -17,22 +17,21 @@ import numpy as np
 from ..records import Reading, Record, file_fingerprint, fingerprint
 from ..structures import Cause, Structure
 from ._diagnosis import Diagnosis
+from .evidence.split import records_of
 from .report.plain_data import jfsm_version, written_model
-
-Inputs = Sequence[Record]
 
 _COUNTED = ("jax", "jaxlib", "numpy", "scipy", "equinox", "diffrax", "optimistix", "lineax")
 """Packages on which the last bits of a number may depend."""
 
 
 def provenance(
-    records: Inputs,
+    records: Sequence[Record],
     model: Any,
     key: jax.Array,
     settings: Mapping[str, Any],
     *,
-    holdout: Inputs = (),
-    simulated: Inputs = (),
+    holdout: Any = None,
+    simulated: Any = None,
 ) -> dict[str, Any]:
     """What a diagnosis was made of, as plain types: digests of its records, its model, settings and key, and by what.
 
@@ -43,8 +42,8 @@ def provenance(
         "records": [plain_input(record) for record in records],
         "files": None,
         "reading": None,
-        "holdout": [plain_input(record) for record in holdout],
-        "simulated": [plain_input(record) for record in simulated],
+        "holdout": [plain_input(record) for record in _records(holdout)],
+        "simulated": [plain_input(record) for record in _records(simulated)],
         "model": {"sha256": model_fingerprint(model), "toml": toml_of(model)},
         "settings": dict(settings),
         "key": plain_key(key),
@@ -63,6 +62,11 @@ def from_files(d: Diagnosis, paths: Sequence[str | Path], reading: Reading) -> D
     files = [{"name": Path(path).name, "sha256": file_fingerprint(path)} for path in paths]
     told = {**d.told["provenance"], "files": files, "reading": reading.plain}
     return replace(d, told={**d.told, "provenance": told})
+
+
+def _records(given: Any) -> list[Record]:
+    """The records that are given; none for a share, or for nothing."""
+    return [] if given is None or isinstance(given, int | float) else records_of(given)
 
 
 def plain_input(record: Record) -> dict[str, Any]:

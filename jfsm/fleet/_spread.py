@@ -63,8 +63,10 @@ def spread_of(values: Values, errors: Values) -> Spread:
     The variance between parts is that of Paule and Mandel [1]_, whose weighted sum of squares is what is to be
     expected, n − 1; its interval is by the profile of the same sum [2]_. The interval of the mean is that of Knapp and
     Hartung [3]_, never narrower than without their factor, with Student's quantile of n − 1 degrees of freedom. A part
-    stands out if its deleted residual, from a model of all others, is beyond the normal quantile for a chance of 5 % in
-    all n parts together [4]_. Several that lie together may hide one another.
+    stands out if its deleted residual, from a model of all others [4]_, is beyond the quantile for a chance of 5 % in
+    all n parts together. The quantile is Student's of n − 2 degrees of freedom, exact where all errors are alike: with
+    the normal one of the source, one fleet in four of 8 parts had an outlier by chance. Several that lie together may
+    hide one another.
 
     References
     ----------
@@ -74,7 +76,7 @@ def spread_of(values: Values, errors: Values) -> Spread:
     .. [4] W. Viechtbauer, M. W.-L. Cheung, Research Synthesis Methods 1 (2010) 112-125.
     """
     n = values.size
-    errors = np.maximum(errors, _SMALLEST * max(float(np.max(np.abs(values))), np.finfo(float).tiny))
+    errors = np.maximum(errors, _SMALLEST * (float(np.max(np.abs(values))) or 1.0))
     variances = errors**2
     if n == 1:
         half = norm.ppf(0.975) * errors[0]
@@ -86,7 +88,7 @@ def spread_of(values: Values, errors: Values) -> Spread:
     half = student.ppf(0.975, n - 1) * np.sqrt(scale / weights.sum())
     low, high = (_between(values, variances, float(chi2.ppf(q, n - 1))) for q in (0.975, 0.025))
     distance = _distances(values, variances)
-    limit = norm.ppf(1 - CHANCE / (2 * n))
+    limit = student.ppf(1 - CHANCE / (2 * n), n - 2) if n >= LEAST else np.inf
     far = tuple(int(i) for i in np.flatnonzero(np.abs(np.nan_to_num(distance)) > limit))
     return Spread(
         mean, float(mean - half), float(mean + half), float(np.sqrt(between)), float(np.sqrt(low)),
