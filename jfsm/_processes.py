@@ -5,10 +5,10 @@ import os
 import signal
 import threading
 from collections import deque
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 from typing import TypeVar
 
@@ -47,13 +47,8 @@ def _until_one_dies(
     do: Callable[[Item], Outcome], waiting: deque[Item], jobs: int
 ) -> Generator[tuple[Item, Outcome], None, list[Item]]:
     """Outcomes of what is waiting until nothing is, or until a process dies; returns what was under way then."""
-    died = list[Item]()
-    reader, writer = multiprocessing.get_context("spawn").Pipe(duplex=False)
-    pool = ProcessPoolExecutor(
-        min(jobs, len(waiting)), multiprocessing.get_context("spawn"), initializer=_begin, initargs=(reader,)
-    )
-    under_way: dict[Future[Outcome], Item] = {}
-    try:
+    died, under_way = list[Item](), dict[Future[Outcome], Item]()
+    with _workers(min(jobs, len(waiting))) as pool:
         while (waiting or under_way) and not died:
             while waiting and len(under_way) < jobs:
                 item = waiting.popleft()
@@ -71,17 +66,22 @@ def _until_one_dies(
                     died.append(item)
                 else:
                     yield item, outcome
-        died.extend(under_way.values())
-        under_way.clear()
+    return [*died, *under_way.values()]
+
+
+@contextmanager
+def _workers(count: int) -> Iterator[ProcessPoolExecutor]:
+    """Processes that are there while this lasts; where it ends by an exception, they end amid their work."""
+    context = multiprocessing.get_context("spawn")
+    reader, writer = context.Pipe(duplex=False)
+    pool = ProcessPoolExecutor(count, context, initializer=_begin, initargs=(reader,))
+    try:
+        yield pool
+        pool.shutdown()
     finally:
-        if under_way or died:
-            writer.close()  # ends the processes at once
-            pool.shutdown(wait=False, cancel_futures=True)
-        else:
-            pool.shutdown()
-            writer.close()
+        writer.close()  # ends those that are left
+        pool.shutdown(wait=False, cancel_futures=True)
         reader.close()
-    return died
 
 
 def _begin(reader: Connection) -> None:

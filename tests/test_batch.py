@@ -15,7 +15,7 @@ from filelock import FileLock
 
 import jfsm
 from jfsm import Record, Structure, diagnose_many
-from jfsm.fleet import Batch, sources_of
+from jfsm.fleet import Batch, _work, sources_of
 from jfsm.records import Reading
 
 MODEL = Structure.sdof(1.0, 9.0, 0.12)
@@ -227,7 +227,7 @@ def test_one_batch_at_a_time_writes_into_a_folder(files, tmp_path, done):
 
 
 def test_an_interrupt_keeps_what_is_done(files, tmp_path, done, monkeypatch):
-    quick = jfsm.fleet._work.diagnosed
+    quick = _work.diagnosed
 
     def interrupted(record: Record, task: Any) -> Any:
         if task.source.name == "run2":
@@ -329,7 +329,8 @@ def test_names_of_files_are_plain_and_differ_on_every_system():
 )
 def test_a_wrong_argument_is_named(records, options, error, words, tmp_path):
     with pytest.raises(error, match=words):
-        diagnose_many(records, **{"model": MODEL, "out": tmp_path / "out", **options})
+        call: Any = {"model": MODEL, "out": tmp_path / "out", **options}
+        diagnose_many(records, **call)
     assert not (tmp_path / "out").exists()
 
 

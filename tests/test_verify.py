@@ -108,7 +108,7 @@ def test_models_that_differ_have_other_fingerprints_also_where_they_are_function
     ]
     models += [jfsm.Simulation(law, dof=1, parameters={"k": k}) for law in (soft, hard) for k in (1.0, 2.0)]
     models += [jfsm.Simulation.from_runs(lambda r: {"displacement": r.force}),
-               jfsm.Simulation.from_runs(lambda r: {"displacement": 2 * r.force})]  # fmt: skip
+               jfsm.Simulation.from_runs(lambda r: {"displacement": -r.time})]  # fmt: skip
     assert len({model_fingerprint(model) for model in models}) == len(models)
     assert model_fingerprint(models[4]) == model_fingerprint(jfsm.Simulation(soft, dof=1, parameters={"k": 1.0}))
 

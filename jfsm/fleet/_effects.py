@@ -68,16 +68,21 @@ def _put(groups: list[_Group], at: tuple, seen: _Seen) -> None:
 def _effect(group: _Group) -> dict[str, Any]:
     causes = Counter(one.finding["cause"] for one in group.seen)
     one_law = len(causes) == 1 and not any(one.finding.get("law_open") for one in group.seen)
-    open_kinds = Counter(one.finding["kind"] for one in group.seen if one.finding.get("law_open"))
-    kinds = open_kinds or Counter(one.finding.get("kind") or "" for one in group.seen)
     return {
         "cause": causes.most_common(1)[0][0],
         "causes": dict(causes),
-        "kind": "" if one_law else kinds.most_common(1)[0][0],
+        "kind": "" if one_law else _kind(group.seen),
         "at": _listed(group.at),
         "records": list(dict.fromkeys(one.record for one in group.seen)),
         "sizes": list(_sizes(group.seen, one_law=one_law)),
     }
+
+
+def _kind(seen: Sequence[_Seen]) -> str:
+    """The class of a law that is open, or differs between records; empty where no finding has one."""
+    open_kinds = Counter(one.finding.get("kind") or "" for one in seen if one.finding.get("law_open"))
+    kinds = open_kinds or Counter(one.finding.get("kind") or "" for one in seen)
+    return kinds.most_common(1)[0][0]
 
 
 def _sizes(seen: Iterable[_Seen], *, one_law: bool) -> Iterator[dict[str, Any]]:

@@ -96,8 +96,7 @@ def sources_of(records: Any, reading: Reading) -> list[Source]:
 
 def _names(given: Sequence[Any]) -> list[str]:
     """Names that differ, as short as they can be."""
-    paths = [PurePath(os.path.abspath(each)) if not isinstance(each, Record) else None for each in given]
-    levels = [list(_levels(path, each, place)) for place, (path, each) in enumerate(zip(paths, given, strict=True), 1)]
+    levels = [list(_levels(each, place)) for place, each in enumerate(given, start=1)]
     found = ["" for _ in given]
     for depth in range(max(map(len, levels))):
         tried = [each[min(depth, len(each) - 1)] for each in levels]
@@ -106,11 +105,12 @@ def _names(given: Sequence[Any]) -> list[str]:
     return _told_apart([name or each[-1] for name, each in zip(found, levels, strict=True)])
 
 
-def _levels(path: PurePath | None, record: Any, place: int) -> Iterator[str]:
+def _levels(given: Any, place: int) -> Iterator[str]:
     """Names of a record from the shortest to the whole path."""
-    if path is None:
-        yield record.name or f"record {place}"
+    if isinstance(given, Record):
+        yield given.name or f"record {place}"
         return
+    path = PurePath(os.path.abspath(given))
     yield path.stem
     yield path.name
     parts = path.parts

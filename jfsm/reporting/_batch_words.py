@@ -21,9 +21,13 @@ def batch_sentence(d: Dictionary) -> str:
     without = [row for row in judged if not row["findings"]]
     if without:
         parts.append(_others(without, alone=not effects))
-    if failed := len(rows) - len(judged):
-        parts.append(f"{failed} of {len(rows)} records {'has' if failed == 1 else 'have'} no diagnosis.")
-    return " ".join(parts) or "No record was diagnosed."
+    return " ".join([*parts, *_failed(len(rows) - len(judged), len(rows))])
+
+
+def _failed(failed: int, total: int) -> Iterator[str]:
+    """How many records have no diagnosis, where some have none."""
+    if failed:
+        yield f"{failed} of {total} records {'has' if failed == 1 else 'have'} no diagnosis."
 
 
 def effect_name(effect: Dictionary) -> str:
