@@ -80,7 +80,7 @@ def _workers(count: int) -> Iterator[ProcessPoolExecutor]:
         pool.shutdown()
     finally:
         writer.close()  # ends those that are left
-        pool.shutdown(wait=False, cancel_futures=True)
+        pool.shutdown(cancel_futures=True)
         reader.close()
 
 
