@@ -4,8 +4,10 @@ from . import paper as paper
 from . import systems as systems
 from .diagnosis import Diagnosis as Diagnosis
 from .diagnosis import Sides as Sides
+from .diagnosis import Verification as Verification
 from .diagnosis import compare as compare
 from .diagnosis import diagnose as diagnose
+from .diagnosis import verify as verify
 from .dynamics import Backbone as Backbone
 from .dynamics import FixedPoint as FixedPoint
 from .dynamics import ForcedResponse as ForcedResponse
@@ -25,6 +27,8 @@ from .estimation import RestoringForce as RestoringForce
 from .estimation import estimate_force_map as estimate_force_map
 from .estimation import estimate_motion as estimate_motion
 from .estimation import restoring_force as restoring_force
+from .fleet import Batch as Batch
+from .fleet import diagnose_many as diagnose_many
 from .identification import Fit as Fit
 from .identification import fit as fit
 from .mapping import MappedForce as MappedForce

@@ -18,6 +18,7 @@ ROOMS = (
     "_format",
     "_limit",
     "_threads",
+    "_processes",
     "_files",
     "_programs",
     "_traced",
@@ -32,6 +33,7 @@ ROOMS = (
     "identification",
     "mapping",
     "diagnosis",
+    "fleet",
     "systems",
     "demo",
     "paper",
@@ -42,7 +44,7 @@ ROOMS = (
 CLOSED = ("plant", "dynamics")
 
 # Rooms whose files and functions stay small.
-SMALL_ROOMS = ("diagnosis", "mapping")
+SMALL_ROOMS = ("diagnosis", "fleet", "mapping")
 MOST_LINES, MOST_COMPLEXITY = 350, 10
 BRANCHES = (ast.If, ast.IfExp, ast.For, ast.While, ast.ExceptHandler, ast.Assert, ast.comprehension, ast.match_case)
 

@@ -102,7 +102,19 @@ def answer(monkeypatch, verdict: str = "consistent") -> dict[str, Any]:
 def test_help_names_every_command():
     result = run("--help")
     assert result.exit_code == 0
-    for name in ("inspect", "simulate", "fit", "diagnose", "map", "causes", "report", "demo", "paper"):
+    for name in (
+        "inspect",
+        "simulate",
+        "fit",
+        "diagnose",
+        "batch",
+        "verify",
+        "map",
+        "causes",
+        "report",
+        "demo",
+        "paper",
+    ):
         assert name in result.stdout
 
 
@@ -292,6 +304,7 @@ def test_a_diagnosis_that_is_not_finished_is_written_and_has_its_own_code(channe
         return unfinished
 
     monkeypatch.setattr("jfsm.diagnosis.diagnose", quick)
+    monkeypatch.setattr("jfsm.diagnosis.from_files", lambda d, paths, reading: d)
     outputs = ["--json", tmp_path / "d.json", "--time-limit", 30, "--next"]
     result = run("diagnose", *channels, "--model", folder / "model.toml", *outputs)
     assert (result.exit_code, result.stdout) == (3, "verdict: cause\n")
@@ -673,6 +686,7 @@ def test_a_reader_who_leaves_early_costs_no_file_and_gets_no_complaint(channels,
         path.write_text("{}")
 
     found = SimpleNamespace(verdict="consistent", print=leave, to_json=numbers)
+    monkeypatch.setattr("jfsm.diagnosis.from_files", lambda d, paths, reading: d)
     monkeypatch.setattr("jfsm.diagnosis.diagnose", lambda *arguments, **options: found)
     result = run("diagnose", *channels, "--model", folder / "model.toml", "--json", tmp_path / "d.json")
     assert (result.exit_code, result.stderr) == (1, "")

@@ -7,7 +7,7 @@ Whatever is slow to import is imported by the command that needs it.
 import os
 import sys
 
-from . import _commands, _models  # noqa: F401  (their commands are part of the program)
+from . import _commands, _fleet, _models  # noqa: F401  (their commands are part of the program)
 from ._command import NOT_FINISHED, app
 
 __all__ = ["app", "main"]

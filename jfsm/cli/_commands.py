@@ -179,7 +179,7 @@ def diagnose(
 
     Of several records, one verdict that holds on all.
     """
-    from ..diagnosis import diagnose
+    from ..diagnosis import diagnose, from_files
 
     if model is None and simulated is None:
         raise ValueError("--model or --simulated must be given: what the simulation is, or what it makes of the test.")
@@ -203,6 +203,8 @@ def diagnose(
             time_limit=time_limit,
             progress=tell,
         )
+    if report is not None or json is not None:
+        d = from_files(d, source.records, source.reading(cut=True))
     if report is not None:
         d.report(report, units)
     if json is not None:

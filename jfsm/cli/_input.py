@@ -6,7 +6,6 @@ import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from inspect import Parameter, signature
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
@@ -15,7 +14,7 @@ import typer
 if TYPE_CHECKING:
     import jax
 
-    from ..records import Listing, OutUnits, Record
+    from ..records import Listing, OutUnits, Reading, Record
     from ..structures import Structure
 
 
@@ -23,7 +22,7 @@ def option(text: str, metavar: str | None = None, panel: str | None = None) -> A
     return typer.Option(help=text, metavar=metavar, rich_help_panel=panel, show_default=False)
 
 
-def _argument(metavar: str, text: str) -> Any:
+def argument(metavar: str, text: str) -> Any:
     return typer.Argument(metavar=metavar, help=text, show_default=False)
 
 
@@ -51,7 +50,7 @@ def _dashed(name: str) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Channels:
+class Channels:
     """What the channels of a file are called: the options that every command with records shares."""
 
     force: Names = None
@@ -86,35 +85,50 @@ class _Channels:
         str | None, option("What is imposed: force, or motion (a component on a rig).", "force|motion", CHANNELS)
     ] = None
 
+    def reading(self, *, cut: bool = False) -> "Reading":
+        """How files are read with these options; with `cut` between the instants that were given."""
+        from ..records import Reading
+
+        kinds = {kind: _channel_names(kind, getattr(self, kind)) for kind in _KINDS.split("|")}
+        cuts = {"since": self.since, "until": self.until} if cut else {}
+        asked = dict(
+            **kinds,
+            base_acceleration=self.base_acceleration,
+            time=self.time,
+            rate=self.rate,
+            units=units(self.unit),
+            where=_where(self.where),
+            sensitivity=_sensitivities(self.sensitivity),
+            run=self.run,
+            sheet=self.sheet,
+            at_rest=self.at_rest or None,  # without the option, what the file says
+            drive=self.drive,  # refused there unless it is one of the two
+            every=_every(self.every, self.resample),
+            resample=None if self.resample is None else _rate(self.resample),
+            **cuts,
+        )
+        return Reading({name: value for name, value in asked.items() if value is not None})
+
     def read_file(self, path: Path, *, cut: bool = False) -> "Record":
         """The record in a file, or with `cut` the part of it between the instants that were given."""
-        from ..records import read
+        return read_as(self.reading(cut=cut), path)
 
-        try:
-            record = read(
-                path,
-                force=_channel_names("force", self.force),
-                displacement=_channel_names("displacement", self.displacement),
-                velocity=_channel_names("velocity", self.velocity),
-                acceleration=_channel_names("acceleration", self.acceleration),
-                base_acceleration=self.base_acceleration,
-                time=self.time,
-                rate=self.rate,
-                units=units(self.unit),
-                where=_where(self.where),
-                sensitivity=_sensitivities(self.sensitivity),
-                run=self.run,
-                sheet=self.sheet,
-                at_rest=self.at_rest or None,  # without the option, what the file says
-                drive=self.drive,  # pyright: ignore[reportArgumentType]  # refused there unless it is one of the two
-            )
-        except TypeError as error:  # from what the file holds; a TypeError of any later step is a mistake of ours
-            raise ValueError(f"{path}: {error}") from error
-        if cut:
-            record = record.between(self.since, self.until)
-        if self.every is not None:
-            return record.resample(_slower(self.every, self.resample, record))
-        return record if self.resample is None else record.resample(_rate(self.resample, record))
+    def held_out(self, given: Sequence[str] | None) -> "float | list[Record] | None":
+        """A share, nothing, or the records in other files."""
+        match given:
+            case None | []:
+                return 0.3
+            case ["none"]:
+                return None
+            case [text] if not Path(text).is_file():
+                try:
+                    return float(text)
+                except ValueError:
+                    pass
+        for text in given:
+            if not Path(text).is_file():
+                raise ValueError(f"--holdout must be a share such as 0.3, none, or files; it was {text!r}.")
+        return [self.read_file(Path(text)) for text in given]
 
     def read_simulated(self, path: Path) -> "Record":
         """The output of a simulation in a file, which may leave out what drove it."""
@@ -153,7 +167,7 @@ class _Channels:
     def given(self) -> list[str]:
         """The options that were given, as they would be typed."""
         words = list[str]()
-        for field in fields(_Channels):
+        for field in fields(Channels):
             value, name = getattr(self, field.name), f"--{_dashed(field.name)}"
             if value is True:
                 words.append(name)
@@ -165,10 +179,10 @@ class _Channels:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RecordFile(_Channels):
+class RecordFile(Channels):
     """A file, and what its channels are called."""
 
-    record: Annotated[Path, _argument("RECORD", f"The record: {_FORMATS}")]
+    record: Annotated[Path, argument("RECORD", f"The record: {_FORMATS}")]
 
     def proposal(self, command: str, names: Mapping[str, Sequence[str]] | None = None, *, even: bool = True) -> str:
         """The command line that does something with the record, its channels those of these `names`, its clock made
@@ -185,31 +199,22 @@ class RecordFile(_Channels):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RecordFiles(_Channels):
+class RecordFiles(Channels):
     """Files whose channels are called alike: levels, repeats or starts of one test."""
 
-    records: Annotated[list[Path], _argument("RECORD", f"One record, or several of one test: {_FORMATS}")]
+    records: Annotated[list[Path], argument("RECORD", f"One record, or several of one test: {_FORMATS}")]
 
     def read(self) -> "list[Record]":
         """The records in the files."""
         return [self.read_file(path, cut=True) for path in self.records]
 
-    def held_out(self, given: Sequence[str] | None) -> "float | list[Record] | None":
-        """A share, nothing, or the records in other files."""
-        match given:
-            case None | []:
-                return 0.3
-            case ["none"]:
-                return None
-            case [text] if not Path(text).is_file():
-                try:
-                    return float(text)
-                except ValueError:
-                    pass
-        for text in given:
-            if not Path(text).is_file():
-                raise ValueError(f"--holdout must be a share such as 0.3, none, or files; it was {text!r}.")
-        return [self.read_file(Path(text)) for text in given]
+
+def read_as(reading: "Reading", path: Path) -> "Record":
+    """The record in a file, read so."""
+    try:
+        return reading.read(path)
+    except TypeError as error:  # from what the file holds; a TypeError of any later step is a mistake of ours
+        raise ValueError(f"{path}: {error}") from error
 
 
 def takes_record(function: Callable[..., None]) -> Callable[..., None]:
@@ -349,25 +354,24 @@ def _sensitivities(given: Sequence[str] | None) -> dict[str, str] | None:
     return {name: text for name, _, text in pairs} or None
 
 
-def _rate(text: str, record: "Record") -> float:
-    """The rate that is asked for, or that of the median step."""
+def _rate(text: str) -> "float | str":
+    """The rate that is asked for; that of the median step has a name."""
     if text == "auto":
-        steps = sorted(after - before for before, after in pairwise(record.time.tolist()))
-        return 1.0 / steps[len(steps) // 2]
+        return text
     try:
         return float(text)
     except ValueError:
         raise ValueError(f"--resample must be a rate in Hz or auto; it was {text!r}.") from None
 
 
-def _slower(every: int, resample: str | None, record: "Record") -> float:
-    """The rate of every so-manieth sample."""
-    if every < 1 or resample is not None:
+def _every(every: int | None, resample: str | None) -> int | None:
+    """Of so many samples one is kept."""
+    if every is not None and (every < 1 or resample is not None):
         raise ValueError(
             f"--every must be a whole number from 1 on, and given without --resample; it was {every}"
             f"{'' if resample is None else f' beside --resample {resample}'}. Give one of them."
         )
-    return record.sample_rate / every
+    return every
 
 
 def _where(given: Sequence[str] | None) -> dict[str, str | float] | None:

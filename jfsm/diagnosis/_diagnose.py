@@ -2,6 +2,7 @@
 
 import secrets
 from collections.abc import Sequence
+from dataclasses import replace
 
 import jax
 
@@ -15,6 +16,7 @@ from ..reporting import shown_by_default
 from ..structures import CauseLike, Runs, Structure, check_order
 from ._conduct import conduct
 from ._diagnosis import Diagnosis
+from ._provenance import plain_settings, provenance
 from ._stand_in import departure, driven_alike, stand_in
 from .evidence.split import records_of
 from .search.steps import Progress, Steps
@@ -107,6 +109,9 @@ def diagnose(
     Most of the time of a first diagnosis is compilation. Programs are therefore kept on disk, up to 500 MB in the
     user's cache folder, or in the folder that ``jax_compilation_cache_dir`` names; none are if JAX is told so
     (``jax.config.update("jax_enable_compilation_cache", False)``).
+
+    ``d.data["provenance"]`` and the page say what the diagnosis was made of: digests of the records and of the model,
+    settings, key, version and machine. `verify` makes it again from these.
     """
     require_x64()
     check_order("jfsm.diagnose(record, model)", model, record)
@@ -119,6 +124,7 @@ def diagnose(
     records = [part.between(since, until) for part in whole]
     key = jax.random.key(secrets.randbits(32)) if key is None else key
     runs = _runs(whole, model, simulated)
+    believed = model
     with shown_by_default(progress) as told, ended_by_interrupt(limit):
         steps = Steps(told, 4 + bool(runs))
         if runs:
@@ -131,7 +137,12 @@ def diagnose(
         assert isinstance(model, Structure)
         d = conduct(records, model, holdout, causes, max_causes, key, places, reconstruction, limit, steps)
         steps.end()
-    return d
+    settings = plain_settings(
+        holdout=holdout, causes=causes, max_causes=max_causes, since=since, until=until, places=places,
+        reconstruction=reconstruction, time_limit=time_limit,
+    )  # fmt: skip
+    made = provenance(whole, believed, key, settings, holdout=holdout, simulated=simulated)
+    return replace(d, told={**d.told, "provenance": made})
 
 
 def _runs(

@@ -9,6 +9,8 @@ from jfsm.records._defects import bridged as bridged
 from jfsm.records._defects import clipped as clipped
 from jfsm.records._defects import defects as defects
 from jfsm.records._defects import spikes as spikes
+from jfsm.records._fingerprint import file_fingerprint as file_fingerprint
+from jfsm.records._fingerprint import fingerprint as fingerprint
 from jfsm.records._listing import Listing as Listing
 from jfsm.records._listing import listing as listing
 from jfsm.records._look import LOOKS as LOOKS
@@ -22,6 +24,9 @@ from jfsm.records._out_units import OutUnits as OutUnits
 from jfsm.records._out_units import out_units as out_units
 from jfsm.records._quantisation import quantisation_step as quantisation_step
 from jfsm.records._read import read as read
+from jfsm.records._reading import CUTS as CUTS
+from jfsm.records._reading import READ as READ
+from jfsm.records._reading import Reading as Reading
 from jfsm.records._record import Record as Record
 from jfsm.records._rest import rest_words as rest_words
 from jfsm.records._rest import rough_noise as rough_noise

@@ -2,6 +2,9 @@
 
 from .._files import write_atomically as write_atomically
 from .._files import write_text_atomically as write_text_atomically
+from ._batch_page import print_batch as print_batch
+from ._batch_page import render_batch as render_batch
+from ._batch_words import batch_sentence as batch_sentence
 from ._checks import nearest as nearest
 from ._checks import stopping_line as stopping_line
 from ._force_map_page import force_map_pictures as force_map_pictures

@@ -5,6 +5,7 @@ from typing import Any
 
 from jfsm.reporting._checks import checks_table, decisive_checks
 from jfsm.reporting._pictures import pictures
+from jfsm.reporting._provenance import provenance_table
 from jfsm.reporting._quantities import number
 from jfsm.reporting._shown_units import in_shown_words
 from jfsm.reporting._summary import key_answers
@@ -81,6 +82,7 @@ def render_page(d: Mapping[str, Any]) -> str:
         model=d.get("model") or (),
         extended=_additions(d),
         notes=d.get("notes") or (),
+        provenance=provenance_table(d.get("provenance") or {}),
         timing=_timing(d.get("timing") or {}),
     )
 
