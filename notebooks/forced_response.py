@@ -32,9 +32,9 @@ print(d)
 # ## Forced response and backbone
 
 # %%
-curves = {name: jfsm.forced_response(one, 1.0, frequencies=(1.5, 6.0)) for name, one in
+curves = {name: jfsm.forced_response(one, 2.0, frequencies=(1.5, 6.0)) for name, one in
           (("truth", truth), ("as believed", model), ("extended", d.extended))}  # fmt: skip
-spine = jfsm.backbone(d.extended, np.linspace(0.02, 1.0, 15))
+spine = jfsm.backbone(d.extended, np.linspace(0.02, 1.8, 15))
 figure, axes = plt.subplots(figsize=(7, 3.2), layout="constrained")
 for name, curve in curves.items():
     axes.plot(curve.frequency, curve.amplitude[:, 0], label=name, linewidth=3 if name == "truth" else 1)
