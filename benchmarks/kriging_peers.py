@@ -55,8 +55,10 @@ def smt(states: np.ndarray, force: np.ndarray) -> np.ndarray | None:
 def _scikit_learn(states: np.ndarray, force: np.ndarray) -> Objective:
     from sklearn.gaussian_process import GaussianProcessRegressor, kernels
 
-    kernel = kernels.ConstantKernel(1.0) * kernels.RBF([1.0, 1.0]) + kernels.WhiteKernel(1.0)
-    model = GaussianProcessRegressor(kernel, optimizer=None).fit(states, force)
+    scales: Any = [1.0, 1.0]
+    kernel: Any = kernels.ConstantKernel(1.0) * kernels.RBF(scales) + kernels.WhiteKernel(1.0)
+    options: Any = {"optimizer": None}
+    model: Any = GaussianProcessRegressor(kernel, **options).fit(states, force)
 
     def objective(point: np.ndarray) -> tuple[Any, Any]:
         value, gradient = model.log_marginal_likelihood(point[[2, 0, 1, 3]], eval_gradient=True)

@@ -213,7 +213,8 @@ def known_force(
     force = np.zeros((length, halves, dof))
     force[:n, :, 0] = drive(np.minimum(inner, record.time[-1]))
     clock = record.time[0] + record.dt * np.arange(length)
-    return InterpolatedInput(*(jnp.asarray(q) for q in (force, np.zeros((length, halves)), clock, record.dt)))
+    at_rest, step = np.zeros((length, halves)), np.asarray(record.dt)
+    return InterpolatedInput(jnp.asarray(force), jnp.asarray(at_rest), jnp.asarray(clock), jnp.asarray(step))
 
 
 def best_of(repeats: int, call: Callable[[], Any]) -> tuple[Any, float]:

@@ -1,6 +1,7 @@
 """Simulations whose accelerations can be asked for in any state, by a program that JAX cannot trace."""
 
 from dataclasses import replace
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -77,10 +78,11 @@ def test_a_motion_that_runs_away_ends_where_it_does():
 
 def test_derivatives_are_those_of_the_traced_function():
     state = jnp.array([0.3, -0.4]), jnp.array([1.0, 0.5]), jnp.array([0.2, -0.1]), jnp.zeros(())
-    asked, traced = (jax.jacfwd(model.own, (0, 1, 2, 3))(model.own_numbers, *state) for model in (ASKED, DOUBLE))
+    both: list[Any] = [(model.own, model.own_numbers) for model in (ASKED, DOUBLE)]
+    asked, traced = (jax.jacfwd(own, (0, 1, 2, 3))(numbers, *state) for own, numbers in both)
     for mine, other in zip(asked, traced, strict=True):
         np.testing.assert_allclose(mine, other, rtol=1e-6, atol=1e-8)
-    answers = [jax.jacfwd(model.own.answer, 1)(model.own_numbers, *state[:2], state[3]) for model in (ASKED, DOUBLE)]
+    answers = [jax.jacfwd(own.answer, 1)(numbers, *state[:2], state[3]) for own, numbers in both]
     np.testing.assert_allclose(*answers, rtol=1e-5, atol=1e-7)
 
 
@@ -135,7 +137,7 @@ def test_what_is_promised_of_it_is_tried(make, error, message):
 
 def test_a_record_must_show_every_coordinate():
     record = noisy()
-    velocity, first = record.velocity, {1: record.displacement[:, 0]}
+    velocity, first = record.velocity, {1: record.responses["displacement", 1]}
     blind = jfsm.Record(record.time, force=record.force, displacement=first, velocity=velocity)
     with pytest.raises(ValueError, match="`record` must show the displacement of every coordinate"):
         jfsm.fit(ASKED, blind)

@@ -15,7 +15,7 @@ import jax
 import numpy as np
 
 from ..records import Reading, Record, file_fingerprint, fingerprint
-from ..structures import Cause, Structure
+from ..structures import CauseLike, Structure, causes_of
 from ._diagnosis import Diagnosis
 from .evidence.split import records_of
 from .report.plain_data import jfsm_version, written_model
@@ -78,7 +78,7 @@ def plain_input(record: Record) -> dict[str, Any]:
 def plain_settings(
     *,
     holdout: Any,
-    causes: Sequence[str | Cause] | None,
+    causes: Sequence[CauseLike] | None,
     max_causes: int,
     since: float | None,
     until: float | None,
@@ -90,7 +90,7 @@ def plain_settings(
     share = holdout if holdout is None or isinstance(holdout, int | float) else "records"
     return {
         "holdout": share,
-        "causes": None if causes is None else [cause if isinstance(cause, str) else cause.id for cause in causes],
+        "causes": None if causes is None else [cause.id for item in causes for cause in causes_of(item)],
         "max_causes": max_causes,
         "since": since,
         "until": until,
