@@ -1,5 +1,6 @@
 """The public names of jfsm, each with the room that it lives in."""
 
+from . import adapters as adapters
 from . import paper as paper
 from . import systems as systems
 from .diagnosis import Diagnosis as Diagnosis

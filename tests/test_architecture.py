@@ -34,6 +34,7 @@ ROOMS = (
     "mapping",
     "diagnosis",
     "fleet",
+    "adapters",
     "systems",
     "demo",
     "paper",

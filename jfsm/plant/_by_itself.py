@@ -26,6 +26,8 @@ _GUESSES = 12
 """Guesses of one stretch, at most."""
 _AHEAD = 4
 """Samples beyond those that have settled of which a guess is believed, twice as many with every guess."""
+_NODES = 9
+"""Instants of a sample, with both its ends, at which the function is asked for, at most; for its slopes at the ends."""
 _NO_NUMBERS = np.zeros(0)
 _SETTLED = 1e-5
 """Change of the motion from one guess to the next, in its size, whose square is none."""
@@ -74,17 +76,17 @@ def _stretch(inputs: InterpolatedInput, first: int) -> InterpolatedInput:
 
 def _settled(plant: Plant, own: EvaluatedMotion, inputs: InterpolatedInput, state: Any) -> tuple[np.ndarray, Any, int]:
     """Motion (3, samples, dof) and states of a stretch from a state on, and how many of its samples have settled."""
-    halves = inputs.force.shape[1]
+    count = min(inputs.force.shape[1], _NODES)
     step = float(inputs.step)
     begin = float(inputs.time[0])
     ends = begin + step * np.arange(_STRETCH + 1)
-    nodes = begin + step / (halves - 1) * np.arange(_STRETCH * (halves - 1) + 1)
+    nodes = begin + step / (count - 1) * np.arange(_STRETCH * (count - 1) + 1)
     x0, v0 = (np.asarray(q)[None] for q in state[0][:2])
     x, v, a = (np.repeat(q, len(nodes), 0) for q in (x0, v0, 0 * v0))
     last, settled, shown, states = np.repeat(x0, _STRETCH + 1, 0), 0, np.zeros((3, _STRETCH, x0.size)), state
     for guess in range(_GUESSES):
         try:
-            table = tabulated(own, _NO_NUMBERS, x, v, a, nodes, nodes=halves, between=(halves - 1) // 2)
+            table = tabulated(own, _NO_NUMBERS, x, v, a, nodes, nodes=count, between=count - 1)
         except np.linalg.LinAlgError:  # so far away that its masses drown in rounding
             break
         acceleration, states = run_on(plant, replace(inputs, near=table), *state)

@@ -1,0 +1,3 @@
+"""Simulations of other programs as simulations of jfsm; each needs its program's own package, an extra."""
+
+from . import mujoco as mujoco

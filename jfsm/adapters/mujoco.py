@@ -1,0 +1,278 @@
+"""Models of MuJoCo: joints on hinges and slides as a `Simulation`, and what was found written back to the model.
+
+What sticks or can be wrong in a joint becomes a term: dry friction, which MuJoCo itself only makes softly, dashpots and
+springs. The rest, with the inertias and gravity, is asked of MuJoCo at every state.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from threading import local
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from ..structures import AbstractTerm, Coulomb, LinearDamping, LinearStiffness, Simulation, Structure
+
+_LOCKED = 1e9
+"""Inertia of joints that are held, as a multiple of the largest of the others."""
+_ATTRIBUTES = {"coulomb": "frictionloss", "damping": "damping", "stiffness": "stiffness"}
+"""What a term in a joint is called in a model, by its kind."""
+
+
+class _Joint(NamedTuple):
+    """A joint that moves: its name, and where its coordinate and its velocity stand."""
+
+    name: str
+    index: int
+    position: int
+    velocity: int
+
+
+@dataclass(frozen=True)
+class Written:
+    """A model with what was found.
+
+    Attributes
+    ----------
+    xml : str
+        The model.
+    changes : str
+        The lines that differ, before and after.
+    left : tuple of str
+        Terms that no attribute of a joint stands for, in words.
+    """
+
+    xml: str
+    changes: str
+    left: tuple[str, ...]
+
+
+def simulation(model: Any, joints: Sequence[str] | None = None, trust: Mapping[str, float] | None = None) -> Simulation:
+    """A model of MuJoCo, its joints as coordinates.
+
+    A record holds the forces in the joints (N m, or N in slides), measured or commanded, and their positions (rad, or
+    m): channel 1 is the first joint. Actuators, contacts, limits and equality constraints take no part.
+
+    Parameters
+    ----------
+    model : path, str or mujoco.MjModel
+        File of a model, its text, or a compiled one; it is left as it is.
+    joints : sequence of str, optional
+        Names of the joints that move, in the order of the record's channels; the others stay where the model has them.
+        By default all.
+    trust : mapping of path to float, optional
+        Relative uncertainty of own values, as of a `Structure`.
+
+    Returns
+    -------
+    Simulation
+        With a Coulomb term for each joint's `frictionloss`, a dashpot for its `damping` and a spring for its
+        `stiffness`; its `armature` is a number of the function, ``armature_<joint>``.
+
+    Raises
+    ------
+    ImportError
+        If MuJoCo is not installed.
+    ValueError
+        If a joint is not there, is no hinge or slide, or equality constraints tie the joints.
+
+    Examples
+    --------
+    >>> model = jfsm.adapters.mujoco.simulation("arm.xml", joints=["shoulder", "elbow"])
+    >>> d = jfsm.diagnose(record, model)
+    >>> print(jfsm.adapters.mujoco.written("arm.xml", d.extended, ["shoulder", "elbow"]).changes)
+    """
+    mj = _package()
+    compiled = _compiled(mj, model)
+    moving = _joints(mj, compiled, joints)
+    if compiled.neq:
+        raise ValueError(
+            f"`model` must have no equality constraints, whose forces would be no function of the state; it has "
+            f"{compiled.neq}. Write their joints as one, or leave them out."
+        )
+    terms = list(_terms(compiled, moving))
+    numbers = {
+        f"armature_{_identifier(joint.name)}": float(compiled.dof_armature[joint.velocity])
+        for joint in moving
+        if compiled.dof_armature[joint.velocity] > 0
+    }
+    asked = _Accelerations(mj, _bare(mj, compiled, moving), moving)
+    return Simulation.from_accelerations(asked, len(moving), numbers, terms, trust=trust or {})
+
+
+def written(model: Any, found: Structure, joints: Sequence[str] | None = None) -> Written:
+    """The model with the values and terms of a structure that was made of it, say `Diagnosis.extended`.
+
+    Friction, dashpots and springs of joints, and armatures, become attributes; whatever else there is stands in
+    `Written.left`.
+
+    Parameters
+    ----------
+    model : path or str
+        File of the model, or its text; nothing is written to it.
+    found : Structure
+    joints : sequence of str, optional
+        As of `simulation`.
+
+    Raises
+    ------
+    ImportError, ValueError
+        As `simulation`.
+    """
+    mj = _package()
+    moving = _joints(mj, _compiled(mj, model), joints)
+    text = _text(model)
+    changed = mj.MjSpec.from_string(text)
+    before = changed.to_xml()
+    left, values = list[str](), dict[tuple[str, str], float]()
+    for term in found.terms:
+        attribute = _ATTRIBUTES.get(term.kind) if min(term.at) == 0 else None
+        if attribute is None:
+            left.append(f"{term.kind} at {term.place}")
+            continue
+        key = moving[max(term.at) - 1].name, attribute
+        values[key] = values.get(key, 0.0) + float(term.values[0])
+    own = dict(zip(found.own.names if found.own else (), np.asarray(found.own_numbers).tolist(), strict=True))
+    for joint in moving:
+        name = f"armature_{_identifier(joint.name)}"
+        if name in own:
+            values[joint.name, "armature"] = own[name]
+    for (name, attribute), value in values.items():
+        _set(changed.joint(name), attribute, value)
+    after = changed.to_xml()
+    lines = difflib.unified_diff(before.splitlines(), after.splitlines(), "given", "found", lineterm="", n=0)
+    return Written(after, "\n".join(lines), tuple(left))
+
+
+class _Accelerations:
+    """Accelerations of the joints that move, in many states at once, whose own memory is that of a thread."""
+
+    def __init__(self, mj: Any, model: Any, joints: Sequence[_Joint]):
+        self._mj, self._model, self._joints, self._threads = mj, model, joints, local()
+
+    def __call__(
+        self,
+        q: Float[np.ndarray, "n dof"],
+        v: Float[np.ndarray, "n dof"],
+        force: Float[np.ndarray, "n dof"],
+        t: Float[np.ndarray, " n"],
+        p: Mapping[str, float],
+    ) -> Float[np.ndarray, "n dof"]:
+        if not hasattr(self._threads, "data"):
+            self._threads.model = _copy(self._model)
+            self._threads.data = self._mj.MjData(self._threads.model)
+        model, data, mj = self._threads.model, self._threads.data, self._mj
+        for joint in self._joints:
+            model.dof_armature[joint.velocity] = p.get(f"armature_{_identifier(joint.name)}", 0.0)
+        positions = [joint.position for joint in self._joints]
+        velocities = [joint.velocity for joint in self._joints]
+        whole, nothing = mj.mjtStage.mjSTAGE_NONE, 1
+        position, speed, applied, moved = data.qpos, data.qvel, data.qfrc_applied, data.qacc  # views, made once
+        found = np.empty(q.shape)
+        for k in range(len(q)):
+            position[positions], speed[velocities], applied[velocities] = q[k], v[k], force[k]
+            mj.mj_forwardSkip(model, data, whole, nothing)
+            found[k] = moved[velocities]
+        return found
+
+
+def _package() -> Any:
+    try:
+        import mujoco
+    except ImportError as error:
+        raise ImportError("MuJoCo is needed to read its models: pip install jfsm[mujoco]") from error
+    return mujoco
+
+
+def _text(model: Any) -> str:
+    return str(model) if isinstance(model, str) and "<mujoco" in model else Path(model).read_text(encoding="utf-8")
+
+
+def _compiled(mj: Any, model: Any) -> Any:
+    """A compiled model, the user's own or one of a file or a text."""
+    if isinstance(model, mj.MjModel):
+        return model
+    if isinstance(model, str) and "<mujoco" in model:
+        return mj.MjModel.from_xml_string(model)
+    if not Path(model).is_file():
+        raise ValueError(f"`model` must be the file of a model of MuJoCo, its text or an MjModel; there is no {model}.")
+    return mj.MjModel.from_xml_path(str(model))
+
+
+def _copy(model: Any) -> Any:
+    import copy
+
+    return copy.copy(model)
+
+
+def _joints(mj: Any, model: Any, names: Sequence[str] | None) -> list[_Joint]:
+    """The joints that move, in the order of their channels."""
+    every = [mj.mj_id2name(model, mj.mjtObj.mjOBJ_JOINT, i) or f"joint_{i + 1}" for i in range(model.njnt)]
+    missing = [name for name in names or () if name not in every]
+    if missing:
+        raise ValueError(f"`joints` must name joints of the model, {', '.join(every)}; got {missing[0]!r}.")
+    straight = (int(mj.mjtJoint.mjJNT_HINGE), int(mj.mjtJoint.mjJNT_SLIDE))
+    found = []
+    for name in names or every:
+        i = every.index(name)
+        if int(model.jnt_type[i]) not in straight:
+            raise ValueError(
+                f"`joints` must be hinges and slides; {name} is a ball or a free joint. Name the others, and it stays "
+                "where the model has it."
+            )
+        found.append(_Joint(name, i, int(model.jnt_qposadr[i]), int(model.jnt_dofadr[i])))
+    if not found:
+        raise ValueError("`model` must have a joint that moves; it has none.")
+    return found
+
+
+def _terms(model: Any, joints: Sequence[_Joint]) -> Iterator[AbstractTerm]:
+    """What a model states of its joints that may be wrong."""
+    for number, joint in enumerate(joints, 1):
+        friction, damping = model.dof_frictionloss[joint.velocity], model.dof_damping[joint.velocity]
+        if friction > 0:
+            yield Coulomb(float(friction), at=(0, number))
+        if damping > 0:
+            yield LinearDamping(float(damping), at=(0, number))
+        if _has_spring(model, joint):
+            yield LinearStiffness(float(model.jnt_stiffness[joint.index]), at=(0, number))
+
+
+def _has_spring(model: Any, joint: _Joint) -> bool:
+    """Whether a joint has a spring that is at rest in its zero; another one is left to MuJoCo."""
+    return model.jnt_stiffness[joint.index] > 0 and model.qpos_spring[joint.position] == 0
+
+
+def _bare(mj: Any, model: Any, joints: Sequence[_Joint]) -> Any:
+    """The model without what its terms stand for, and without all that is no function of its state."""
+    bare, moving = _copy(model), [joint.velocity for joint in joints]
+    disable = mj.mjtDisableBit
+    bare.opt.disableflags |= int(disable.mjDSBL_CONSTRAINT) | int(disable.mjDSBL_ACTUATION)
+    bare.dof_damping[moving] = 0.0
+    for joint in joints:
+        if _has_spring(model, joint):
+            bare.jnt_stiffness[joint.index] = 0.0
+    held = [i for i in range(model.nv) if i not in moving]
+    bare.dof_armature[held] = _LOCKED * max(1.0, float(np.max(model.body_inertia)), float(np.max(model.body_mass)))
+    return bare
+
+
+def _identifier(name: str) -> str:
+    return re.sub(r"\W", "_", name)
+
+
+def _set(joint: Any, attribute: str, value: float) -> None:
+    """An attribute of a joint, of which some versions keep further coefficients behind the first."""
+    old = getattr(joint, attribute)
+    if np.ndim(old):
+        new = np.array(old)
+        new[0] = value
+        setattr(joint, attribute, new)
+    else:
+        setattr(joint, attribute, value)
