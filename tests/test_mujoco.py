@@ -1,10 +1,14 @@
 """Models of MuJoCo as simulations: they move as MuJoCo has them; what hides in a joint is named and written back."""
 
+from pathlib import Path
+
 import jax
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import jfsm
+from jfsm.cli import app
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -133,3 +137,19 @@ def test_friction_in_one_joint_is_named_there_and_nothing_in_none():
     assert 'frictionloss="0.' in jfsm.adapters.mujoco.written(arm(), d.extended).changes
     silent = jfsm.diagnose(recorded(arm(), 1000, noise=0.01), owner, causes=causes, key=jax.random.key(0))
     assert silent.verdict in ("consistent", "parameters") and all(f.cause != "coulomb" for f in silent.findings)
+
+
+def test_the_command_line_takes_a_model_and_writes_it_with_what_was_found(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("arm.xml").write_text(arm('damping="0.027"'))
+    recorded(arm(), 400, noise=0.002).write("run.csv")
+    names = {kind: [f"--{kind}={j}={kind}_{j}" for j in (1, 2)] for kind in ("force", "displacement")}
+    channels = [*names["force"], *names["displacement"]]
+    out = CliRunner().invoke(app, ["fit", "run.csv", *channels, "--model", "arm.xml", "--out", "fitted.xml"])
+    assert out.exit_code == 0, out.output
+    found = jfsm.adapters.mujoco.simulation("fitted.xml").values()
+    assert found["damping@0-2.c"] == pytest.approx(0.03, rel=0.02)
+    Path("m.toml").write_text("mass = [1.0]")
+    command = ["fit", "run.csv", *channels, "--model", "m.toml", "--joints", "elbow", "--out", "x.toml"]
+    wrong = CliRunner().invoke(app, command)
+    assert wrong.exit_code == 2 and "--joints must be left out" in wrong.output.replace("\n", " ")

@@ -4,11 +4,10 @@ What sticks or can be wrong in a joint becomes a term: dry friction, which MuJoC
 springs. The rest, with the inertias and gravity, is asked of MuJoCo at every state.
 """
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from threading import local
@@ -102,7 +101,7 @@ def simulation(model: Any, joints: Sequence[str] | None = None, trust: Mapping[s
         for joint in moving
         if compiled.dof_armature[joint.velocity] > 0
     }
-    asked = _Accelerations(mj, _bare(mj, compiled, moving), moving)
+    asked = _Accelerations(_bare(mj, compiled, moving), moving)
     return Simulation.from_accelerations(asked, len(moving), numbers, terms, trust=trust or {})
 
 
@@ -153,8 +152,11 @@ def written(model: Any, found: Structure, joints: Sequence[str] | None = None) -
 class _Accelerations:
     """Accelerations of the joints that move, in many states at once, whose own memory is that of a thread."""
 
-    def __init__(self, mj: Any, model: Any, joints: Sequence[_Joint]):
-        self._mj, self._model, self._joints, self._threads = mj, model, joints, local()
+    def __init__(self, model: Any, joints: Sequence[_Joint]):
+        self._model, self._joints, self._threads = model, joints, local()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _Accelerations, (self._model, self._joints)
 
     def __call__(
         self,
@@ -164,10 +166,11 @@ class _Accelerations:
         t: Float[np.ndarray, " n"],
         p: Mapping[str, float],
     ) -> Float[np.ndarray, "n dof"]:
+        mj = _package()
         if not hasattr(self._threads, "data"):
-            self._threads.model = _copy(self._model)
-            self._threads.data = self._mj.MjData(self._threads.model)
-        model, data, mj = self._threads.model, self._threads.data, self._mj
+            self._threads.model = copy(self._model)
+            self._threads.data = mj.MjData(self._threads.model)
+        model, data = self._threads.model, self._threads.data
         for joint in self._joints:
             model.dof_armature[joint.velocity] = p.get(f"armature_{_identifier(joint.name)}", 0.0)
         positions = [joint.position for joint in self._joints]
@@ -203,12 +206,6 @@ def _compiled(mj: Any, model: Any) -> Any:
     if not Path(model).is_file():
         raise ValueError(f"`model` must be the file of a model of MuJoCo, its text or an MjModel; there is no {model}.")
     return mj.MjModel.from_xml_path(str(model))
-
-
-def _copy(model: Any) -> Any:
-    import copy
-
-    return copy.copy(model)
 
 
 def _joints(mj: Any, model: Any, names: Sequence[str] | None) -> list[_Joint]:
@@ -251,7 +248,7 @@ def _has_spring(model: Any, joint: _Joint) -> bool:
 
 def _bare(mj: Any, model: Any, joints: Sequence[_Joint]) -> Any:
     """The model without what its terms stand for, and without all that is no function of its state."""
-    bare, moving = _copy(model), [joint.velocity for joint in joints]
+    bare, moving = copy(model), [joint.velocity for joint in joints]
     disable = mj.mjtDisableBit
     bare.opt.disableflags |= int(disable.mjDSBL_CONSTRAINT) | int(disable.mjDSBL_ACTUATION)
     bare.dof_damping[moving] = 0.0

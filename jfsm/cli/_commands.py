@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ._believed import Joints, ModelFile, load, save
 from ._command import FOUND, NOT_FINISHED, command
 from ._input import (
     CHANNELS,
-    ModelFile,
     Rate,
     RecordFile,
     RecordFiles,
@@ -18,7 +18,6 @@ from ._input import (
     check_outputs,
     is_even,
     link,
-    load,
     option,
     random_key,
     shown_units,
@@ -70,6 +69,7 @@ def simulate(
     model: ModelFile,
     out: Annotated[Path, option("Write the motion here, as a csv, txt, npz or mat file.")],
     laws: OwnLaws = None,
+    joints: Joints = None,
 ) -> None:
     """Run a model freely under the force of a record, and write its motion as a record.
 
@@ -80,7 +80,7 @@ def simulate(
     check_outputs({"--out": out}, [source.record, model])
     run_laws(laws)
     record = source.read()
-    response = simulate(load(model), record)
+    response = simulate(load(model, joints), record)
     if not response.result.ok:
         say(f"At t = {response.escape_time:.6g} s {response.result.value}. Nothing was written.")
         raise typer.Exit(NOT_FINISHED)
@@ -94,9 +94,10 @@ def simulate(
 def fit(
     source: RecordFiles,
     model: ModelFile,
-    out: Annotated[Path, option("Write the fitted model here, as TOML.")],
+    out: Annotated[Path, option("Write the fitted model here, as the model is given.")],
     fixed: Annotated[list[str] | None, option("What stays as it is: mass, stiffness@0-1.k; repeatable.")] = None,
     laws: OwnLaws = None,
+    joints: Joints = None,
     out_units: ShownUnits = None,
 ) -> None:
     """Fit a model's own values to a record, or to several at once."""
@@ -106,7 +107,7 @@ def fit(
 
     check_outputs({"--out": out}, [*source.records, model])
     run_laws(laws)
-    records, given = source.read(), load(model)
+    records, given = source.read(), load(model, joints)
     asked = shown_units(out_units, records[0])
     with progress() as tell:
         tell("fitting", 0, 1)
@@ -131,7 +132,7 @@ def fit(
         show_table("Frequency and damping", ("linear part", "fitted", "95 % interval", "unit"), modes)
     for words in (*found.identifiability, *filter(None, [found.missing])):
         typer.echo(words)
-    found.structure.save(out)
+    save(found.structure, out, model, joints)
     typer.echo(f"The fitted model is in {out}.")
     if not found.result.ok:
         say(f"The fit {found.result.value}.")
@@ -142,7 +143,9 @@ def fit(
 @takes_record
 def diagnose(
     source: RecordFiles,
-    model: Annotated[Path | None, option("The model that is believed, as TOML; without it, give --simulated.")] = None,
+    model: Annotated[
+        Path | None, option("The model that is believed, TOML or XML of MuJoCo; without it, give --simulated.")
+    ] = None,
     simulated: Annotated[
         Path | None,
         option("Output of a simulation that is no TOML: its run, channels called as in the record.", "FILE"),
@@ -155,7 +158,7 @@ def diagnose(
     ] = None,
     report: Annotated[Path | None, option("Write the page here, as HTML.")] = None,
     json: Annotated[Path | None, option("Write every number here, as JSON.")] = None,
-    extended: Annotated[Path | None, option("Write the mended model here, as TOML; a map goes beside it.")] = None,
+    extended: Annotated[Path | None, option("Write the mended model here, as it was given; maps go beside it.")] = None,
     cause: Annotated[
         list[str] | None,
         typer.Option(
@@ -164,6 +167,7 @@ def diagnose(
         ),
     ] = None,
     laws: OwnLaws = None,
+    joints: Joints = None,
     max_causes: Annotated[int, typer.Option(help="Effects that may act at once: 1, or 2.", min=1, max=2)] = 2,
     what_next: Annotated[
         bool, typer.Option("--next", help="Also say what test would tell the two likeliest causes apart.")
@@ -188,7 +192,7 @@ def diagnose(
     check_outputs({"--report": report, "--json": json, "--extended": extended}, inputs)
     run_laws(laws)
     causes, records, held = causes_named(cause), source.read(), source.held_out(holdout)
-    believed = None if model is None else load(model)
+    believed = None if model is None else load(model, joints)
     run = None if simulated is None else source.read_simulated(simulated)
     units = shown_units(out_units, records[0])
     with progress() as tell:
@@ -210,7 +214,7 @@ def diagnose(
     if json is not None:
         d.to_json(json)
     if extended is not None:
-        d.extended.save(extended)
+        save(d.extended, extended, model, joints)
     with said_in_options():
         d.print(units)  # last, so that a reader who closes the pipe loses no file
     if why:

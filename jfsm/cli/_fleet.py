@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ._believed import Joints, ModelFile, load
 from ._command import BAD_INPUT, FOUND, NOT_FINISHED, command
 from ._input import (
     Channels,
-    ModelFile,
     Seed,
     ShownUnits,
     argument,
-    load,
     option,
     random_key,
     read_as,
@@ -80,6 +79,7 @@ def batch(
         float | None, option("Seconds for each record, after which its best verdict so far is given.", "SECONDS")
     ] = None,
     key: Seed = None,
+    joints: Joints = None,
     out_units: ShownUnits = None,
 ) -> None:
     """Diagnose many records with one model, each by itself, and say what they have in common.
@@ -90,7 +90,7 @@ def batch(
 
     table = (out / "summary.csv").resolve()  # of the batch before, where results go beside the records
     inputs = sources_of([path for path in source.paths if path.resolve() != table], source.reading(cut=True))
-    believed, held, asked = load(model), source.held_out(holdout), shown_units(out_units)
+    believed, held, asked = load(model, joints), source.held_out(holdout), shown_units(out_units)
     settings = Settings.of(
         holdout=held, causes=cause, max_causes=max_causes, time_limit=time_limit, key=random_key(key)
     )

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     import jax
 
     from ..records import Listing, OutUnits, Reading, Record
-    from ..structures import Structure
 
 
 def option(text: str, metavar: str | None = None, panel: str | None = None) -> Any:
@@ -41,7 +40,6 @@ ShownUnits = Annotated[
     str | None,
     option("Show results in these units, as in,lbf,deg, or in those of the record (given).", "UNITS|given"),
 ]
-ModelFile = Annotated[Path, option("The model that is believed, as TOML.")]
 Seed = Annotated[int | None, option("Seed of the few random draws; without it, another one every time.")]
 
 
@@ -241,16 +239,6 @@ def is_even(record: "Record") -> bool:
     except ValueError:
         return False
     return True
-
-
-def load(path: Path) -> "Structure":
-    """The structure in a TOML file."""
-    from ..structures import Structure
-
-    try:
-        return Structure.load(path)
-    except TypeError as error:  # a text where a number belongs
-        raise ValueError(f"{path}: {error}") from error
 
 
 def random_key(seed: int | None) -> "jax.Array | None":
