@@ -56,7 +56,9 @@ def recorded(xml: str, samples: int, noise: float = 0.0) -> jfsm.Record:
 def test_it_moves_as_mujoco_has_it():
     xml = arm('damping="0.03" stiffness="0.4"', 'damping="0.05" armature="0.004"')
     model, record = jfsm.adapters.mujoco.simulation(xml), recorded(xml, 150)
-    assert model.values() == {
+    values = model.values()
+    assert 0 < values.pop("armature_elbow") < 1e-5  # not stated
+    assert values == {
         "armature_shoulder": 0.004,
         "damping@0-1.c": 0.05,
         "damping@0-2.c": 0.03,
@@ -95,6 +97,7 @@ def test_what_was_found_goes_into_the_attributes_of_the_joints(tmp_path):
     assert 'frictionloss="0.1"' in found.xml and 'frictionloss="0.1"' in found.changes
     assert found.left == ("cubic_stiffness at 1-2",)
     again = jfsm.adapters.mujoco.simulation(found.xml).values()
+    assert again.pop("armature_elbow") < 1e-5  # next to nothing is not written
     assert again == {
         "armature_shoulder": 0.005,
         "damping@0-1.c": 0.06,
@@ -153,3 +156,19 @@ def test_the_command_line_takes_a_model_and_writes_it_with_what_was_found(tmp_pa
     command = ["fit", "run.csv", *channels, "--model", "m.toml", "--joints", "elbow", "--out", "x.toml"]
     wrong = CliRunner().invoke(app, command)
     assert wrong.exit_code == 2 and "--joints must be left out" in wrong.output.replace("\n", " ")
+
+
+@pytest.mark.slow
+def test_an_armature_that_the_model_does_not_state_is_found_and_written():
+    real = arm(shoulder='damping="0.05" armature="0.02"')
+    d = jfsm.diagnose(
+        recorded(real, 800, noise=0.01),
+        jfsm.adapters.mujoco.simulation(arm()),
+        causes=["coulomb", "missing_stiffness", "force_delay"],
+        max_causes=1,
+        key=jax.random.key(0),
+    )
+    assert d.verdict == "parameters" and "armature_shoulder" in {name for f in d.findings for name in f.parameters}
+    assert d.refitted["armature_shoulder"].value == pytest.approx(0.02, rel=0.05)
+    changes = jfsm.adapters.mujoco.written(arm(), d.extended).changes
+    assert 'name="shoulder" armature="0.0' in changes and 'name="elbow" armature' not in changes

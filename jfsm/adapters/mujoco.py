@@ -20,6 +20,10 @@ from ..structures import AbstractTerm, Coulomb, LinearDamping, LinearStiffness, 
 
 _LOCKED = 1e9
 """Inertia of joints that are held, as a multiple of the largest of the others."""
+_UNSTATED, _UNCERTAIN = 1e-4, 5.0
+"""An armature that a model does not state, as a share of the inertia of its joint, and how uncertain it is;"""
+_WORTH = 1e-3
+"""and the share from which it is written."""
 _ATTRIBUTES = {"coulomb": "frictionloss", "damping": "damping", "stiffness": "stiffness"}
 """What a term in a joint is called in a model, by its kind."""
 
@@ -72,7 +76,8 @@ def simulation(model: Any, joints: Sequence[str] | None = None, trust: Mapping[s
     -------
     Simulation
         With a Coulomb term for each joint's `frictionloss`, a dashpot for its `damping` and a spring for its
-        `stiffness`; its `armature` is a number of the function, ``armature_<joint>``.
+        `stiffness`; its `armature` is a number of the function, ``armature_<joint>``. One that the model does not state
+        begins at next to nothing, and may become anything.
 
     Raises
     ------
@@ -95,14 +100,12 @@ def simulation(model: Any, joints: Sequence[str] | None = None, trust: Mapping[s
             f"`model` must have no equality constraints, whose forces would be no function of the state; it has "
             f"{compiled.neq}. Write their joints as one, or leave them out."
         )
-    terms = list(_terms(compiled, moving))
-    numbers = {
-        f"armature_{_identifier(joint.name)}": float(compiled.dof_armature[joint.velocity])
-        for joint in moving
-        if compiled.dof_armature[joint.velocity] > 0
-    }
     asked = _Accelerations(_bare(mj, compiled, moving), moving)
-    return Simulation.from_accelerations(asked, len(moving), numbers, terms, trust=trust or {})
+    stated = {_armature(joint): float(compiled.dof_armature[joint.velocity]) for joint in moving}
+    least = dict(zip(stated, _UNSTATED * _inertias(asked, stated), strict=True))
+    numbers = {name: value or float(least[name]) for name, value in stated.items()}
+    believed = {name: _UNCERTAIN for name, value in stated.items() if not value} | dict(trust or {})
+    return Simulation.from_accelerations(asked, len(moving), numbers, _terms(compiled, moving), trust=believed)
 
 
 def written(model: Any, found: Structure, joints: Sequence[str] | None = None) -> Written:
@@ -138,10 +141,11 @@ def written(model: Any, found: Structure, joints: Sequence[str] | None = None) -
         key = moving[max(term.at) - 1].name, attribute
         values[key] = values.get(key, 0.0) + float(term.values[0])
     own = dict(zip(found.own.names if found.own else (), np.asarray(found.own_numbers).tolist(), strict=True))
+    compiled = _compiled(mj, model)
     for joint in moving:
-        name = f"armature_{_identifier(joint.name)}"
-        if name in own:
-            values[joint.name, "armature"] = own[name]
+        there = own.get(_armature(joint), 0.0)
+        if compiled.dof_armature[joint.velocity] or there > _WORTH * _own_inertia(found, moving.index(joint)):
+            values[joint.name, "armature"] = there
     for (name, attribute), value in values.items():
         _set(changed.joint(name), attribute, value)
     after = changed.to_xml()
@@ -172,7 +176,7 @@ class _Accelerations:
             self._threads.data = mj.MjData(self._threads.model)
         model, data = self._threads.model, self._threads.data
         for joint in self._joints:
-            model.dof_armature[joint.velocity] = p.get(f"armature_{_identifier(joint.name)}", 0.0)
+            model.dof_armature[joint.velocity] = p[_armature(joint)]
         positions = [joint.position for joint in self._joints]
         velocities = [joint.velocity for joint in self._joints]
         whole, nothing = mj.mjtStage.mjSTAGE_NONE, 1
@@ -260,8 +264,21 @@ def _bare(mj: Any, model: Any, joints: Sequence[_Joint]) -> Any:
     return bare
 
 
-def _identifier(name: str) -> str:
-    return re.sub(r"\W", "_", name)
+def _armature(joint: _Joint) -> str:
+    """What the armature of a joint is called among the numbers of the function."""
+    return "armature_" + re.sub(r"\W", "_", joint.name)
+
+
+def _inertias(asked: _Accelerations, numbers: Mapping[str, float]) -> Float[np.ndarray, " dof"]:
+    """Inertia of every joint at rest, the others moving freely."""
+    dof = len(numbers)
+    pushes, rest = np.concatenate([np.zeros((1, dof)), np.eye(dof)]), np.zeros((dof + 1, dof))
+    a = asked(rest, rest, pushes, np.zeros(dof + 1), numbers)
+    return 1.0 / np.diag(a[1:] - a[0])
+
+
+def _own_inertia(found: Structure, joint: int) -> float:
+    return float(np.asarray(found.mass)[joint, joint])
 
 
 def _set(joint: Any, attribute: str, value: float) -> None:

@@ -301,7 +301,7 @@ def _basis(
             doubt.append(_SPRING if spring else _DASHPOT)
     if structure.own is not None:  # what it would need more were a number of its own larger
         motion = latent.displacement, latent.velocity, latent.acceleration
-        by_number = own_force(structure.own, structure.own_numbers, *motion, time)[2]
+        by_number = own_force(structure.own, np.asarray(structure.own_numbers), *motion, time)[2]
         columns += list(np.moveaxis(by_number, 2, 0))
         doubt += [_DASHPOT] * by_number.shape[2]
     for j in range(dof):
