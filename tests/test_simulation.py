@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 import jfsm
 from jfsm.diagnosis.evidence.setup import Problem
+from jfsm.estimation import _latent
 from jfsm.identification import missing_force, prepare
 
 STEP, SAMPLES = 0.02, 600
@@ -144,6 +145,22 @@ def test_the_force_that_is_missing_is_that_of_the_structure():
     np.testing.assert_allclose(found.std, expected.std, rtol=1e-6)
     closely = 1e-6 * float(np.std(expected.acceleration))
     np.testing.assert_allclose(found.acceleration, expected.acceleration, atol=closely)
+
+
+def test_amplitudes_with_which_the_smoother_breaks_down_are_passed_over(monkeypatch):
+    nuisances, likelihoods = prepare(noisy(lambda d, w: 300.0 * d**3), CHAIN), _latent._likelihoods
+    calls = list[int]()
+
+    def breaks_down(models, *rest):
+        calls.append(len(models.by_force))
+        found = np.array(likelihoods(models, *rest))
+        return found if len(calls) < 4 else np.full_like(found, np.nan)
+
+    whole = missing_force(CHAIN, nuisances)
+    monkeypatch.setattr(_latent, "_likelihoods", breaks_down)
+    found = missing_force(CHAIN, nuisances)
+    assert len(calls) == 4 and np.all(np.isfinite(found.force))
+    assert np.std(found.force - whole.force) < np.std(whole.force)
 
 
 def test_numbers_of_the_function_are_found_and_a_base_is_refused():

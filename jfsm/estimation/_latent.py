@@ -154,8 +154,9 @@ def latent_force(
 
     def most_likely(models: list[_Model], beliefs: list[_Belief], swell: np.ndarray) -> _Likely:
         stacked = jax.tree.map(lambda *leaves: np.stack(leaves), *models)
-        likelihoods = np.asarray(_likelihoods(stacked, *data, swell))
-        best = int(np.nanargmax(likelihoods))
+        found = np.asarray(_likelihoods(stacked, *data, swell))
+        likelihoods = np.where(np.isnan(found), -np.inf, found)  # a smoother that has broken down
+        best = int(np.argmax(likelihoods))
         return _Likely(float(likelihoods[best]), models[best], beliefs[best], swell)
 
     def motion(one: _Likely) -> tuple[np.ndarray, np.ndarray]:
