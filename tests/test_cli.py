@@ -296,6 +296,26 @@ def test_an_interrupted_diagnosis_says_so_and_leaves_no_file(channels, folder, t
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("mistake", "name"),
+    [
+        (lambda: "a" + 1, "TypeError"),  # pyright: ignore
+        (lambda: np.ones(3) + np.ones(2), "ValueError"),
+        (lambda: {}["nobody knows"], "KeyError"),
+        (lambda: 1 / 0, "ZeroDivisionError"),
+    ],
+)
+def test_a_mistake_of_jfsm_ends_in_one_line_and_a_code_of_its_own(mistake, name, channels, folder, monkeypatch):
+    monkeypatch.setattr("jfsm.diagnosis.diagnose", lambda *arguments, **options: mistake())
+    command = ("diagnose", *channels, "--model", folder / "model.toml")
+    result = run(*command)
+    assert result.exit_code == 4 and result.stderr.count("\n") == 1
+    assert result.stderr.startswith(f"jfsm: Internal error, a mistake of jfsm and not of the input: {name}: ")
+    assert "Traceback" not in result.stderr
+    monkeypatch.setenv("JFSM_TRACEBACK", "1")
+    assert "Traceback" in run(*command).stderr
+
+
 def test_a_diagnosis_that_is_not_finished_is_written_and_has_its_own_code(channels, folder, tmp_path, monkeypatch):
     unfinished = FakeDiagnosis(verdict="cause", finished=False, to_json=lambda path: path.write_text("{}"))
 
@@ -333,14 +353,6 @@ def test_a_process_that_is_interrupted_at_work_ends_with_its_own_code(tmp_path):
     assert process.returncode == 3
     assert errors.endswith("jfsm: Stopped before the end; no file was left half written.\n")
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("mistake", [lambda: "a" + 1, lambda: np.ones(3) + np.ones(2)])  # pyright: ignore
-def test_a_mistake_of_the_library_is_not_taken_for_bad_input(mistake, channels, folder, monkeypatch):
-    monkeypatch.setattr("jfsm.diagnosis.diagnose", lambda *arguments, **options: mistake())
-    result = run("diagnose", *channels, "--model", folder / "model.toml")
-    assert result.exit_code == 1 and isinstance(result.exception, TypeError | ValueError)
-    assert "jfsm:" not in result.stderr
 
 
 def test_a_missing_record_is_named(folder):

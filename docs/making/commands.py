@@ -11,7 +11,7 @@ from jfsm.cli import app
 HEAD = """# Command line
 
 `jfsm COMMAND --help` says the same. Exit status: 0 consistent, or done where nothing is judged; 1 anything found, or
-undecided; 2 bad input; 3 not finished.
+undecided; 2 bad input; 3 not finished; 4 an internal error.
 
 """
 

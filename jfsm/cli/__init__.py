@@ -1,6 +1,7 @@
 """The command line: it parses, calls and prints.
 
-Exit codes: 0 consistent (or done, where nothing is judged), 1 anything found or undecided, 2 bad input, 3 not finished.
+Exit codes: 0 consistent (or done, where nothing is judged), 1 anything found or undecided, 2 bad input, 3 not
+finished, 4 an internal error.
 Whatever is slow to import is imported by the command that needs it.
 """
 

@@ -13,7 +13,9 @@ from .._programs import settings
 from ._input import in_options
 from ._output import say
 
-FOUND, BAD_INPUT, NOT_FINISHED = 1, 2, 3
+FOUND, BAD_INPUT, NOT_FINISHED, INTERNAL = 1, 2, 3, 4
+_TRACEBACK = "JFSM_TRACEBACK"
+"""Variable of the environment that asks for the traceback of an internal error."""
 
 app = typer.Typer(
     help="What a simulation gets wrong against a measured record, the name of the cause, and the gain of mending it.",
@@ -48,13 +50,13 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
         try:
             _settle_jax()
             function(**options)
-        except BrokenPipeError:  # whoever read the output has seen enough; typer ends such a process in silence
+        # Whoever read the output of a broken pipe has seen enough; typer ends such a process in silence.
+        except (typer.Exit, typer.Abort, typer.BadParameter, BrokenPipeError):
             raise
-        except (ValueError, OSError, ModuleNotFoundError) as error:
-            if not _is_refusal(error):
-                raise
-            say(_words(error))
-            raise typer.Exit(BAD_INPUT) from None
+        except Exception as error:
+            refused = isinstance(error, ValueError | OSError | ImportError) and _is_refusal(error)
+            say(_words(error) if refused else _internal(error))
+            raise typer.Exit(BAD_INPUT if refused else INTERNAL) from None
         except KeyboardInterrupt:
             say("Stopped before the end; no file was left half written.")
             raise typer.Exit(NOT_FINISHED) from None
@@ -79,11 +81,23 @@ def _settle_jax() -> None:
 def _is_refusal(error: Exception) -> bool:
     """Whether an error is about the input: of the operating system, or raised by jfsm in words.
 
-    A ValueError from a library underneath is a mistake of jfsm, whose traceback is wanted.
+    A ValueError from a library underneath is a mistake of jfsm.
     """
     *_, (frame, _) = traceback.walk_tb(error.__traceback__)
     package = frame.f_globals.get("__package__") or ""
     return isinstance(error, OSError) or package.split(".")[0] == "jfsm"
+
+
+def _internal(error: Exception) -> str:
+    """A mistake of jfsm in one line, after its traceback if that is wanted."""
+    if os.environ.get(_TRACEBACK):
+        traceback.print_exception(error)
+    *_, last = traceback.extract_tb(error.__traceback__)
+    what = " ".join(str(error).split())
+    return (
+        f"Internal error, a mistake of jfsm and not of the input: {type(error).__name__}: {what} ({last.filename}, "
+        f"line {last.lineno}). Run it again with {_TRACEBACK}=1 for the traceback, and report it."
+    )
 
 
 def _words(error: Exception) -> str:

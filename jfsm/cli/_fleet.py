@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ._believed import Joints, ModelFile, load
-from ._command import BAD_INPUT, FOUND, NOT_FINISHED, command
+from ._command import BAD_INPUT, FOUND, INTERNAL, NOT_FINISHED, command
 from ._input import (
     Channels,
     Seed,
@@ -27,9 +27,6 @@ from ._output import progress, said_in_options
 if TYPE_CHECKING:
     from ..fleet import Batch
     from ..records import Reading, Record
-
-INTERNAL = 4
-"""Exit code of a batch in which jfsm itself failed on a record."""
 
 
 @dataclass(frozen=True, kw_only=True)
