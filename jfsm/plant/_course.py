@@ -21,7 +21,8 @@ _FEWEST = 5
 class Course:
     """Displacement, velocity and acceleration (2 n + 1, dof) on half samples, smoothed, and their instants [s].
 
-    A table about a motion that errs by a little errs by the square of that.
+    A table about a motion that errs by a little errs by the square of that. It ends as far from the motion as that is
+    wide: a prediction that has gone so wrong must stay finite, as those of a sine do.
     """
 
     x: Float[np.ndarray, "nodes dof"]
@@ -61,7 +62,10 @@ class Course:
         numbers = np.asarray(structure.own_numbers)
         key = numbers.tobytes()
         if key not in self._tables:
-            self._tables[key] = tabulated(structure.own, numbers, self.x, self.v, self.a, self.time, nodes=3)
+            reach = np.stack([np.ptp(self.x, 0), np.ptp(self.v, 0)])
+            self._tables[key] = tabulated(
+                structure.own, numbers, self.x, self.v, self.a, self.time, nodes=3, reach=reach
+            )
             while len(self._tables) > _KEPT:
                 self._tables.pop(next(iter(self._tables)))
         return self._tables[key]

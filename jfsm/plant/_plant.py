@@ -117,13 +117,17 @@ class MapSlot(eqx.Module):
 class Local(eqx.Module):
     """How a plant of its own motion moves within a sample, on nodes from its beginning to its end.
 
-    What is not inertia needs `force` + `stiffness` x + `damping` v.
+    What is not inertia needs `force` at a motion `x`, `v`, and `stiffness` and `damping` times what the plant's own is
+    farther on: up to `reach` (2, dof), beyond which the slopes say nothing.
     """
 
     mass: Float[Array, "*lanes nodes dof dof"]
     force: Float[Array, "*lanes nodes dof"]
     stiffness: Float[Array, "*lanes nodes dof dof"]
     damping: Float[Array, "*lanes nodes dof dof"]
+    x: Float[Array, "*lanes nodes dof"]
+    v: Float[Array, "*lanes nodes dof"]
+    reach: Float[Array, "*lanes 2 dof"]
     time: Float[Array, "*lanes"]
     step: Float[Array, "*lanes"]
 
@@ -139,7 +143,9 @@ class Local(eqx.Module):
 
     def force_at(self, x: Float[Array, " dof"], v: Float[Array, " dof"], t: Float[Array, ""]) -> Float[Array, " dof"]:
         """Force that all but the inertia needs."""
-        by_node = self.force + jnp.sum(self.stiffness * x[None, None, :] + self.damping * v[None, None, :], 2)
+        farther, most = (x[None, :] - self.x, v[None, :] - self.v), self.reach[:, None, :]
+        dx, dv = (jnp.maximum(jnp.minimum(q, r), -r) for q, r in zip(farther, most, strict=True))
+        by_node = self.force + jnp.sum(self.stiffness * dx[:, None, :] + self.damping * dv[:, None, :], 2)
         return jnp.sum(self.weights(t)[:, None] * by_node, 0)
 
 

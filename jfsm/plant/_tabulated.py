@@ -26,9 +26,10 @@ _STEP = 1e-5
 
 
 class Tabulated(eqx.Module):
-    """Mass matrix, stiffness and damping near a motion, and the force that all but the inertia needs.
+    """Mass matrix, stiffness and damping near a motion `x`, `v`, and the force that all but the inertia needs in it.
 
-    All but the matrices of slopes are for numbers of zero, and what each number adds stands beside.
+    Masses and forces are for numbers of zero, and what each number adds stands beside. The slopes hold up to `reach`
+    (2, dof) from the motion.
     """
 
     mass: Float[Array, "*n nodes dof dof"]
@@ -37,12 +38,15 @@ class Tabulated(eqx.Module):
     force_by: Float[Array, "*n nodes own dof"]
     stiffness: Float[Array, "*n nodes dof dof"]
     damping: Float[Array, "*n nodes dof dof"]
+    x: Float[Array, "*n nodes dof"]
+    v: Float[Array, "*n nodes dof"]
+    reach: Float[Array, "*n 2 dof"]
 
     def of(self, numbers: Float[Array, " own"], time: Float[Array, ""], step: Float[Array, ""]) -> Local:
         """What these numbers make of a sample's row of it, from `time` on."""
         mass = self.mass + jnp.sum(numbers[None, :, None, None] * self.mass_by, 1)
         force = self.force + jnp.sum(numbers[None, :, None] * self.force_by, 1)
-        return Local(mass, force, self.stiffness, self.damping, time, step)
+        return Local(mass, force, self.stiffness, self.damping, self.x, self.v, self.reach, time, step)
 
 
 def near(plant: Plant, table: Tabulated | None, time: Float[Array, ""], step: Float[Array, ""]) -> Plant:
@@ -72,19 +76,21 @@ def tabulated(
     *,
     nodes: int,
     between: int = 1,
+    reach: Float[np.ndarray, "2 dof"] | None = None,
 ) -> Tabulated:
     """The table (n, nodes, ...) of a function near a motion, `nodes` a sample with both its ends.
 
     The motion is given on all of them, an end that two samples share but once. Slopes are asked for at one of
-    `between` of these, and straight in between.
+    `between` of these, and straight in between; they hold up to `reach` from the motion, or anywhere.
     """
     e = _equation(own, numbers, x, v, a, time, between)
-    still = np.einsum("nij,nj->ni", e.stiffness, x) + np.einsum("nij,nj->ni", e.damping, v)
     mass = e.mass - np.einsum("p,npij->nij", numbers, e.mass_by)
-    force = e.force - np.einsum("p,npi->ni", numbers, e.force_by) - still
+    force = e.force - np.einsum("p,npi->ni", numbers, e.force_by)
     take = (nodes - 1) * np.arange((len(time) - 1) // (nodes - 1))[:, None] + np.arange(nodes)
-    parts: Any = mass, e.mass_by, force, e.force_by, e.stiffness, e.damping
-    return Tabulated(*(part[take] for part in parts))
+    parts: Any = mass, e.mass_by, force, e.force_by, e.stiffness, e.damping, x, v
+    reach = np.full((2, x.shape[1]), np.inf) if reach is None else reach
+    rows: Any = [*(part[take] for part in parts), np.broadcast_to(reach, (len(take), *reach.shape))]
+    return Tabulated(*rows)
 
 
 def own_force(
