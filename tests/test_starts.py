@@ -306,6 +306,8 @@ def test_bristles_too_stiff_for_the_usual_steps_are_followed_by_finer_ones():
 class Unbounded(jfsm.CubicStiffness):
     """A law whose force is no number."""
 
+    kind = "unbounded"
+
     def force(self, d, w, z, t):
         return self.k3 * jnp.inf * d
 

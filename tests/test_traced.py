@@ -141,6 +141,8 @@ def test_nothing_is_kept_where_the_source_cannot_be_read(folder, monkeypatch):
 
 def test_laws_of_the_user_are_not_kept_and_those_of_the_library_are(folder):
     class Mine(jfsm.CubicStiffness):
+        kind = "mine"
+
         def force(self, d, w, z, t):
             return 7.0 * super().force(d, w, z, t)
 
