@@ -45,6 +45,8 @@ _LEAST_DISTURBANCE = 2e-4
 _MOSTLY = 0.5
 _SAME = 1e-9
 """Rounding, relative."""
+_CLEAN = 0.003
+"""Noise of a channel, as a share of its spread, up to which its slope is as good as measured."""
 _STOPPED = 1 / 3
 """Share of the time in which damping stops a motion, where nothing is elastic, that counts as a period."""
 _LEADING, _PERIODS = 1024, 20
@@ -367,7 +369,9 @@ def prepare(record: Record, model: Structure, reconstruction: Reconstruction = "
         at_rest=record.at_rest,
         reconstruction=reconstruction,
         notes=(*record.notes, *seen.notes, *words),
-        course=_course(model, record, channels, values),
+        course=_course(
+            model, record, dict(zip(channels, values.T, strict=True)), bool(np.all(floor < _CLEAN * spread))
+        ),
     )
 
 
@@ -440,18 +444,25 @@ def _prepare_imposed(record: Record, model: Structure, reconstruction: Reconstru
     )
 
 
-def _course(model: Structure, record: Record, channels: tuple[Channel, ...], values: np.ndarray) -> Course | None:
-    """The motion near which a function of a model's own is tabulated."""
+def _course(model: Structure, record: Record, seen: Mapping[Channel, np.ndarray], clean: bool) -> Course | None:
+    """The motion near which a function of a model's own is tabulated.
+
+    One that JAX can trace is asked for itself where no channel shows velocities and displacements are not `clean`: a
+    table about a motion whose velocity errs much blurs what a law does.
+    """
     if model.own is None:
         return None
-    found = Course.of(dict(zip(channels, values.T, strict=True)), model.dof, record.dt, float(record.time[0]))
-    if found is None and isinstance(model.own, EvaluatedMotion):
-        raise ValueError(
-            "`record` must show the displacement of every coordinate of a simulation by `from_accelerations`; its "
-            f"channels are {', '.join(f'{kind} {j}' for kind, j in channels)}. Estimate the motion first "
-            "(jfsm.estimate_motion), or write the accelerations with jax.numpy."
-        )
-    return found
+    found = Course.of(seen, model.dof, record.dt, float(record.time[0]))
+    if isinstance(model.own, EvaluatedMotion):
+        if found is None:
+            raise ValueError(
+                "`record` must show the displacement of every coordinate of a simulation by `from_accelerations`; its "
+                f"channels are {', '.join(f'{kind} {j}' for kind, j in seen)}. Estimate the motion first "
+                "(jfsm.estimate_motion), or write the accelerations with jax.numpy."
+            )
+        return found
+    shows_speed = all(("velocity", j) in seen for j in range(1, model.dof + 1))
+    return found if shows_speed or clean else None
 
 
 def _mass(structure: Structure) -> np.ndarray:
