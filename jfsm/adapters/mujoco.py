@@ -128,9 +128,9 @@ def written(model: Any, found: Structure, joints: Sequence[str] | None = None) -
         As `simulation`.
     """
     mj = _package()
-    moving = _joints(mj, _compiled(mj, model), joints)
-    text = _text(model)
-    changed = mj.MjSpec.from_string(text)
+    compiled = _compiled(mj, model)
+    moving = _joints(mj, compiled, joints)
+    changed = mj.MjSpec.from_string(model if _is_text(model) else Path(model).read_text(encoding="utf-8"))
     before = changed.to_xml()
     left, values = list[str](), dict[tuple[str, str], float]()
     for term in found.terms:
@@ -141,10 +141,9 @@ def written(model: Any, found: Structure, joints: Sequence[str] | None = None) -
         key = moving[max(term.at) - 1].name, attribute
         values[key] = values.get(key, 0.0) + float(term.values[0])
     own = dict(zip(found.own.names if found.own else (), np.asarray(found.own_numbers).tolist(), strict=True))
-    compiled = _compiled(mj, model)
-    for joint in moving:
+    for joint, inertia in zip(moving, np.diag(np.asarray(found.mass)), strict=True):
         there = own.get(_armature(joint), 0.0)
-        if compiled.dof_armature[joint.velocity] or there > _WORTH * _own_inertia(found, moving.index(joint)):
+        if compiled.dof_armature[joint.velocity] or there > _WORTH * inertia:
             values[joint.name, "armature"] = there
     for (name, attribute), value in values.items():
         _set(changed.joint(name), attribute, value)
@@ -197,15 +196,16 @@ def _package() -> Any:
     return mujoco
 
 
-def _text(model: Any) -> str:
-    return str(model) if isinstance(model, str) and "<mujoco" in model else Path(model).read_text(encoding="utf-8")
+def _is_text(model: Any) -> bool:
+    """Whether a model is given as its text, not as its file."""
+    return isinstance(model, str) and "<mujoco" in model
 
 
 def _compiled(mj: Any, model: Any) -> Any:
     """A compiled model, the user's own or one of a file or a text."""
     if isinstance(model, mj.MjModel):
         return model
-    if isinstance(model, str) and "<mujoco" in model:
+    if _is_text(model):
         return mj.MjModel.from_xml_string(model)
     if not Path(model).is_file():
         raise ValueError(f"`model` must be the file of a model of MuJoCo, its text or an MjModel; there is no {model}.")
@@ -275,10 +275,6 @@ def _inertias(asked: _Accelerations, numbers: Mapping[str, float]) -> Float[np.n
     pushes, rest = np.concatenate([np.zeros((1, dof)), np.eye(dof)]), np.zeros((dof + 1, dof))
     a = asked(rest, rest, pushes, np.zeros(dof + 1), numbers)
     return 1.0 / np.diag(a[1:] - a[0])
-
-
-def _own_inertia(found: Structure, joint: int) -> float:
-    return float(np.asarray(found.mass)[joint, joint])
 
 
 def _set(joint: Any, attribute: str, value: float) -> None:

@@ -222,9 +222,10 @@ def _of_many(own: EvaluatedMotion, numbers: Float[Array, " own"], dof: int) -> C
     """The acceleration in a state, asked for in rows of two, if the function gives the promised shape."""
 
     def ask(q: Any, v: Any, force: Any, t: Any) -> np.ndarray:
-        given = dict(zip(own.names, np.asarray(numbers).tolist(), strict=True))
-        rows = [np.repeat(np.asarray(part, float)[None], 2, 0) for part in (q, v, force, t)]
-        found = np.asarray(own.function(*rows, given))
+        given, x, w, pushed, time = (
+            np.repeat(np.asarray(part, float)[None], 2, 0) for part in (numbers, q, v, force, t)
+        )
+        found = own.many(given, x, w, pushed, time)
         if found.shape != (2, dof):
             raise ValueError(
                 f"`accelerations` must give a row of {dof} accelerations per state, for two states shape (2, {dof}); "
