@@ -691,7 +691,7 @@ def test_a_demonstration_ends_with_zero_and_says_where_its_page_is(tmp_path, mon
 
 
 def test_a_reader_who_leaves_early_costs_no_file_and_gets_no_complaint(channels, folder, tmp_path, monkeypatch):
-    def leave():
+    def leave(units):
         raise BrokenPipeError(errno.EPIPE, "Broken pipe")
 
     def numbers(path):
