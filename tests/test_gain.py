@@ -161,6 +161,24 @@ def test_where_noise_makes_runs_part_they_are_as_long_as_they_agree(sensitive: b
         assert np.sqrt(np.mean((whole - curves["record"].channels["displacement", 1]) ** 2)) > 0.3
 
 
+@pytest.mark.parametrize(("off", "astray"), [(0.10, True), (0.001, False)])
+def test_where_no_model_follows_the_whole_motion_runs_are_some_periods_long(off: float, astray: bool):
+    rate, damping = (2 * np.pi) ** 2, 0.02
+    time = np.arange(4000) / 50.0
+    motion = np.exp(-damping / 2 * time) * np.cos(np.sqrt(rate - damping**2 / 4) * time)
+    record = jfsm.Record(time, displacement=motion + 1e-3 * np.random.default_rng(3).standard_normal(time.size))
+    given, refitted, extended = (jfsm.Structure.sdof(1.0, (1 + off * share) * rate, damping) for share in (1.2, 1, 0.6))
+    fitted, held, noise = prepare(record, given), [HeldOut(record, 2000)], {("displacement", 1): 1e-3}
+    gain, _ = measure_gain(
+        given, lambda of: refitted, lambda of: extended, held, noise, fitted, jax.random.key(0), beyond_refit=True
+    )
+    assert gain.astray is astray and (gain.horizon is not None) is astray
+    assert any("No model follows" in note for note in how_run(fitted, gain)) is astray
+    if astray:  # in one run all three are as wrong as no motion at all, though one is nearer by four tenths
+        assert gain.horizon == pytest.approx(6 * fitted.period)
+        assert gain.after < 1.0 and 0.2 < gain.closed < 0.6
+
+
 def test_what_a_cause_closes_counts_from_the_refitted_model():
     errors = HeldOutErrors(before=0.8, refitted=0.3, after=0.2, floor=0.1, interval=(0.0, 1.0))
     assert errors.closed == pytest.approx(6 / 7)

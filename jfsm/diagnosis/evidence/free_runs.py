@@ -25,7 +25,8 @@ _BLOCK, _FEWEST, _MOST_BLOCKS = 2.0, 5, 20
 _SHORTEST_RUN = 6.0
 """Periods of the shortest run: its start is estimated from some of them."""
 _RESAMPLED = 1000
-_ERRORS = ("before", "refitted", "after", "floor")
+_RUNS = ("before", "refitted", "after")
+_ERRORS = (*_RUNS, "floor")
 
 
 StructureOf = Callable[[int | None], Structure]
@@ -68,6 +69,11 @@ def how_run(fitted: Nuisances, gain: HeldOutErrors | None = None) -> list[str]:
         return [f"Nothing holds the structure in place: it is run for {PREDICTED * fitted.period:.2g} s at a time."]
     if gain is None or gain.horizon is None:
         return []
+    if gain.astray:
+        return [
+            f"No model follows the whole motion: run from its start, each ends farther from it than the motion is "
+            f"wide. Errors on held-out readings are those of runs of {gain.horizon:.3g} s, each from its own start."
+        ]
     return [
         f"The motion is sensitive: noise alone makes two of its runs part after {gain.horizon:.3g} s. Errors on "
         f"held-out readings are those of runs of this length, each from its own start."
@@ -91,23 +97,31 @@ def measure_gain(
     `noise` is the standard deviation of each channel's noise; `fitted` tells how long a period is, whether anything
     holds the structure in place, which zeros wander, and when the force acts. The model as given runs as the force was
     recorded, and goes between its samples as is `assumed`. Where nothing holds a structure in place many short runs
-    take the place of a long one; so they do where noise alone makes the runs of the extended model part, as far as they
-    agree. What is closed counts from the model as given, or `beyond_refit` from the refitted one.
+    take the place of a long one; so they do where no model follows the motion from its start to its end, and, as far as
+    they agree, where noise alone makes runs of the extended model part. What is closed counts from the model as given, or `beyond_refit` from the refitted one.
     """
     rng = np.random.default_rng(np.asarray(jax.random.key_data(key)).astype(np.uint32).tolist())
     without = "refitted" if beyond_refit else "before"
     models = [{"before": given, "refitted": refitted(part.of), "after": extended(part.of)} for part in held]
-    compared, horizon = _as_far_as_runs_agree(held, models, noise, fitted, assumed, rng, without)
-    channels = _channel_gains([each.squares for each in compared], held[0].record.units, beyond_refit=beyond_refit)
-    total = {
-        name: math.sqrt(float(np.mean([(getattr(c, name) / c.spread) ** 2 for c in channels.values()])))
-        for name in _ERRORS
-    }
+    units = held[0].record.units
+    compared, horizon, astray = _as_far_as_runs_tell(held, models, noise, fitted, assumed, rng, without)
+    channels = _channel_gains([each.squares for each in compared], units, beyond_refit=beyond_refit)
+    total = _of_all_channels(channels)
     spreads = np.array([c.spread for c in channels.values()])
     blocks = np.stack([block for each in compared for block in each.blocks])
     interval = _interval(np.mean(blocks / spreads**2, -1), total["floor"], rng)
-    gain = Gain(**total, channels=channels, interval=interval, beyond_refit=beyond_refit, horizon=horizon)
+    gain = Gain(
+        **total, channels=channels, interval=interval, beyond_refit=beyond_refit, horizon=horizon, astray=astray
+    )
     return gain, [each.curves for each in compared]
+
+
+def _of_all_channels(channels: Mapping[str, ChannelGain]) -> dict[str, float]:
+    """Root mean square errors over channels, as shares of their spreads."""
+    return {
+        name: math.sqrt(float(np.mean([(getattr(c, name) / c.spread) ** 2 for c in channels.values()])))
+        for name in _ERRORS
+    }
 
 
 class _Compared(NamedTuple):
@@ -124,7 +138,7 @@ class _Compared(NamedTuple):
     agrees: float | None
 
 
-def _as_far_as_runs_agree(
+def _as_far_as_runs_tell(
     held: Sequence[HeldOut],
     models: Sequence[Mapping[str, Structure]],
     noise: Mapping[tuple, float],
@@ -132,8 +146,9 @@ def _as_far_as_runs_agree(
     assumed: Reconstruction,
     rng: np.random.Generator,
     without: str,
-) -> tuple[list[_Compared], float | None]:
-    """Models compared on every held-out record, and the seconds of a run where noise alone makes longer ones part."""
+) -> tuple[list[_Compared], float | None, bool]:
+    """Models compared on every held-out record, the seconds of a run where longer ones tell nothing, and whether that
+    is since no model follows the whole motion; else noise alone makes longer runs part."""
 
     def compared(length: float | None) -> list[_Compared]:
         pairs = zip(held, models, strict=True)
@@ -141,12 +156,21 @@ def _as_far_as_runs_agree(
 
     found = compared(in_parts(fitted))
     apart = [each.agrees for each in found if each.agrees is not None]
-    if not apart:
-        return found, None
-    horizon = max(min(apart), _SHORTEST_RUN * fitted.period)
+    astray = not apart and without == "refitted" and all(map(_astray, found))
+    if not apart and not astray:
+        return found, None, False
+    horizon = max(min(apart, default=0.0), _SHORTEST_RUN * fitted.period)
     if horizon >= min(len(part.record[part.begin :]) * part.record.dt for part in held):
-        return found, None
-    return compared(horizon), horizon
+        return found, None, False
+    return compared(horizon), horizon, astray
+
+
+def _astray(runs: _Compared) -> bool:
+    """Whether every model's run is farther from the measured motion than that is wide: it tells nothing then."""
+    squares = runs.squares
+    if runs.curves["record"].drive == "motion":
+        return False
+    return all(np.mean([squares[name][c] / squares["spread"][c] for c in squares["spread"]]) > 1.0 for name in _RUNS)
 
 
 def _compared(

@@ -12,7 +12,8 @@ class HeldOutErrors:
 
     `before` is the model as given, `refitted` its own values refitted, `after` the hypothesis, `floor` what noise in
     the drive, in the start and in the readings would leave; `interval` is the 95 % one of `closed`. What an effect
-    closes counts `beyond_refit`. Where noise alone makes runs part, they are `horizon` long [s].
+    closes counts `beyond_refit`. Runs are `horizon` long [s] where noise alone makes longer ones part, or where every
+    model's goes `astray`: farther from the motion than that is wide.
     """
 
     before: float
@@ -22,6 +23,7 @@ class HeldOutErrors:
     interval: tuple[float, float]
     beyond_refit: bool = False
     horizon: float | None = None
+    astray: bool = False
 
     @property
     def without(self) -> float:

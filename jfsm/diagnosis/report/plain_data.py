@@ -101,6 +101,7 @@ def plain_gain(gain: Gain | None) -> dict[str, Any] | None:
         "floor": gain.floor,
         "beyond_refit": gain.beyond_refit,
         "horizon": gain.horizon,
+        "astray": gain.astray,
         "channels": channels,
     }
 

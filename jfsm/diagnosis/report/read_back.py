@@ -51,5 +51,5 @@ def _gain(written: Mapping[str, Any] | None) -> Gain | None:
         for name, row in written["channels"].items()
     }
     low, high = written["interval"]
-    errors = {error: written[error] for error in (*_ERRORS, "horizon")}
+    errors = {error: written[error] for error in (*_ERRORS, "horizon", "astray")}
     return Gain(**errors, interval=(low, high), beyond_refit=beyond_refit, channels=channels)
