@@ -98,7 +98,8 @@ def measure_gain(
     holds the structure in place, which zeros wander, and when the force acts. The model as given runs as the force was
     recorded, and goes between its samples as is `assumed`. Where nothing holds a structure in place many short runs
     take the place of a long one; so they do where no model follows the motion from its start to its end, and, as far as
-    they agree, where noise alone makes runs of the extended model part. What is closed counts from the model as given, or `beyond_refit` from the refitted one.
+    they agree, where noise alone makes runs of the extended model part. What is closed counts from the model as given,
+    or `beyond_refit` from the refitted one.
     """
     rng = np.random.default_rng(np.asarray(jax.random.key_data(key)).astype(np.uint32).tolist())
     without = "refitted" if beyond_refit else "before"
