@@ -10,6 +10,7 @@ import pytest
 
 import jfsm
 from jfsm.diagnosis.evidence.evidence import Evidence, Measure, NotMeasuredError, SetAside, Setting, map_on
+from jfsm.diagnosis.evidence.found_again import FoundAgain
 from jfsm.diagnosis.evidence.held_out import HeldOutErrors
 from jfsm.diagnosis.evidence.prediction import Prediction
 from jfsm.diagnosis.evidence.scorecard import GIVEN, REFITTED, EffectCard, OtherShapes, Scorecard
@@ -68,6 +69,7 @@ def evidence_of(
     shapes: Shapes | Mapping[str, Shapes] = 0.0,
     maps: Mapping[str, float] | None = None,
     held_out: Held = None,
+    again: FoundAgain | None = None,
     with_model_error: Evidence | None = None,
     periods: float = 100.0,
     set_aside: tuple[SetAside, ...] = (),
@@ -87,6 +89,7 @@ def evidence_of(
         other_shapes,
         with_map,
         lambda key: held_out[key] if isinstance(held_out, Mapping) else held_out,
+        lambda key: again,
         lambda: with_model_error,
     )
     known = {one.key: one for one in (given(0.0, 0.5), refit(1000.0, 0.1), *cards)}
@@ -694,6 +697,16 @@ ROWS = [
         evidence_of(card(9000.0, 0.002, "coulomb"), shapes=5000.0,
                     held_out={REFITTED: held(0.9), FRICTION: held(0.45, interval=(0.4, 0.7))}),
         f"cause {FRICTION}?", "undecided refitted"),
+    *(
+        Row(name, number, relation,
+            evidence_of(card(9000.0, 0.002, "coulomb"), shapes=5000.0, held_out=held(0.9),
+                        again=FoundAgain("LuGre friction at link ground–1", explains, size, 1400.0)),
+            f"cause {FRICTION}?", "undecided refitted", plus=plus)
+        for name, number, relation, explains, size, plus in (
+            ("class_found_again", "nearly_all", ">=", 0.9, 1380.0, 0.0),
+            ("class_as_large_again", "differs", "<=", 0.9, 1200.0, 1.0),
+        )
+    ),
     Row("closes_half", "half", ">=",
         evidence_of(card(9000.0, 0.002, "coulomb"), held_out=held(0.6, interval=(0.3, 0.55))),
         f"cause {FRICTION}", f"cause {FRICTION}?"),

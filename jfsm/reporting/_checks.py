@@ -22,7 +22,7 @@ OPEN = ("undecided", "unnamed")
 """Verdicts that name no cause though something is wrong."""
 CHOOSES = "leaves_only_noise"
 """A check that chooses which ones are made next, and is no failure."""
-OF_ITS_CLASS = ("probability_of_class", "class_closes_half")
+OF_ITS_CLASS = ("probability_of_class", "class_closes_half", "class_found_again", "class_as_large_again")
 """Checks that ask whether the class of a law is named where the law is not."""
 
 

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..._result import Check
+from .found_again import FoundAgain
 from .held_out import HeldOutErrors
 from .plain import as_plain
 from .prediction import Prediction
@@ -63,6 +64,7 @@ class Measure(NamedTuple):
     other_shapes: Callable[[str], OtherShapes]
     with_map: Callable[[str], Prediction | None]
     held_out: Callable[[str], HeldOutErrors | None]
+    found_again: Callable[[str], FoundAgain | None]
     with_model_error: Callable[[], "Evidence | None"]
 
 
@@ -103,6 +105,10 @@ class Evidence:
     def held_out(self, key: str) -> HeldOutErrors | None:
         """Errors of runs over held-out readings with a hypothesis; None where nothing was held out."""
         return self._asked("held_out", key, self.measure.held_out)
+
+    def found_again(self, key: str) -> FoundAgain | None:
+        """A law fitted to held-out readings alone; None where there are none, or it is not one law."""
+        return self._asked("found_again", key, self.measure.found_again)
 
     def with_model_error(self) -> "Evidence | None":
         """The same where all hypotheses are admitted some model error; None where that does not help."""
@@ -171,6 +177,9 @@ _MADE: Mapping[str, Callable[[Any], Any]] = {
     "with_map": lambda written: Prediction(**{name: np.array(v) for name, v in _numbers(written).items()}),
     "held_out": lambda written: HeldOutErrors(
         **{**_numbers(written), "interval": tuple(_numbers(written)["interval"])}
+    ),
+    "found_again": lambda written: FoundAgain(
+        **{**written, **_numbers({n: v for n, v in written.items() if n != "law"})}
     ),
     "with_model_error": Evidence.of_plain,
 }

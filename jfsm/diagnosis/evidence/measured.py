@@ -16,12 +16,14 @@ from ..channels.delays import Late, showing_late
 from ..hypotheses.effect import key_of
 from ..nats import many
 from ..search.climbing import LeftBehind
+from ..search.held_out_alone import found_again
 from ..search.rounds import Searched
 from ..thresholds import THRESHOLDS
 from ..verdict.decision import Decision
 from .as_recorded import change_by_times
 from .evidence import Evidence, Measure, SetAside, Setting, has_map, map_on
 from .fitted import Trial
+from .found_again import FoundAgain
 from .free_runs import Gain, measure_gain
 from .held_out import HeldOutErrors
 from .identifiable import in_step, untold
@@ -65,7 +67,7 @@ class Weighed:
     @cached_property
     def evidence(self) -> Evidence:
         """Scorecards, and what is measured when it is asked for."""
-        measure = Measure(self._other_shapes, self._with_map, self._held_out, self._with_model_error)
+        measure = Measure(self._other_shapes, self._with_map, self._held_out, self._found_again, self._with_model_error)
         cards = {card.key: card for card in self._cards()}
         return Evidence(
             self._setting(),
@@ -101,9 +103,12 @@ class Weighed:
         return structure if decision.verdict == "consistent" else showing_late(structure, late)
 
     def _handed_out(self, decision: Decision) -> str:
-        """Key of the hypothesis to go on with: never one that runs worse over held-out readings than as given."""
+        """Key of the hypothesis to go on with: never one that runs worse over held-out readings than as given, nor a
+        law whose numbers turn on the motion."""
         undecided = decision.verdict == "undecided" and self._refit_is_no_better()
-        return GIVEN if decision.verdict == "consistent" or undecided else decision.winner
+        if decision.verdict == "consistent" or undecided:
+            return GIVEN
+        return REFITTED if decision.of_a_class_alone else decision.winner
 
     def _refit_is_no_better(self) -> bool:
         """Whether own values refitted are hardly likelier than as given, or run worse over held-out readings."""
@@ -177,6 +182,10 @@ class Weighed:
                 beyond_refit=beyond_refit,
             )
         return self.runs[key][0].errors
+
+    def _found_again(self, key: str) -> FoundAgain | None:
+        held, kind = self.held_out.held, self.evidence.cards[key].effects[0].classes[0]
+        return found_again(self.trial(key), kind, self.found.causes, self.problem, held) if held else None
 
     def _with_model_error(self) -> Evidence | None:
         again = None if self.model_error else forgiving(self.found.every, self.problem)

@@ -150,18 +150,23 @@ _NUMBERS = {
 }  # fmt: skip
 
 
+def classes_in(trial: Trial, problem: Problem) -> list[tuple[str, ...]]:
+    """Classes of every effect of a trial, the narrowest first, for the motion of the first record."""
+    peak = problem.first.crest * problem.first.length
+    both = zip(trial.effects, trial.parts, strict=True)
+    return [classes_of(effect.cause, part, peak, peak * problem.first.omega) for effect, part in both]
+
+
 def scorecard(
     trial: Trial, among: Sequence[Trial], problem: Problem, *, in_step: bool = False, not_identifiable: str = ""
 ) -> Scorecard:
     """The scorecard of a trial among others, beside the model of a problem."""
-    peak = problem.first.crest * problem.first.length
-    speed = peak * problem.first.omega
     really = (law.otherwise(trial.structure.stiffness_of(law.at)) for law in trial.laws)
     return Scorecard(
         key=trial.key,
         effects=tuple(
-            EffectCard.of(effect, classes_of(effect.cause, part, peak, speed))
-            for effect, part in zip(trial.effects, trial.parts, strict=True)
+            EffectCard.of(effect, classes)
+            for effect, classes in zip(trial.effects, classes_in(trial, problem), strict=True)
         ),
         evidence=trial.evidence,
         prediction=trial.prediction,

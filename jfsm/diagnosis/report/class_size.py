@@ -1,27 +1,17 @@
 """How large a cause is, as a number that all laws of its class share."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from ..._result import Estimate
 from ...identification import values_of
-from ...plant import forces_of_law
 from ...structures import AbstractTerm, Structure
 from ..evidence.fitted import Trial
 from ..evidence.missing_force import Residual
-from ..hypotheses.law_classes import (
-    AMPLITUDE,
-    DAMPING,
-    FASTER,
-    FRICTION,
-    HARDENING,
-    PLAY,
-    SOFTENING,
-    TWO_WAYS,
-)
+from ..hypotheses.class_sizes import size_unit, sizes_along
 from .estimates import Units, name_of, unknowns_of_effect
 
 _STEP = 0.1
@@ -42,46 +32,6 @@ class Member(NamedTuple):
         return self.trial.effects[self.which].cause.id
 
 
-class Measure(NamedTuple):
-    """A size of a force along a motion, in the units of force, displacement and time."""
-
-    of: Callable[[np.ndarray, np.ndarray, np.ndarray], float]
-    unit: Callable[[Units], str]
-
-
-def _mean_power_by_speed(force: np.ndarray, d: np.ndarray, w: np.ndarray) -> float:
-    return float(force @ w / np.sum(np.abs(w)))
-
-
-def _equivalent_damping(force: np.ndarray, d: np.ndarray, w: np.ndarray) -> float:
-    return float(force @ w / (w @ w))
-
-
-def _equivalent_stiffness(force: np.ndarray, d: np.ndarray, w: np.ndarray) -> float:
-    about = d - np.mean(d)
-    return float(force @ about / (about @ about))
-
-
-def _rms(force: np.ndarray, d: np.ndarray, w: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(force**2)))
-
-
-_GAINED = Measure(_equivalent_stiffness, lambda units: f"{units['force']}/{units['displacement']}")
-_FORCE = Measure(_rms, lambda units: units["force"])
-_OF_CLASS: Mapping[str, Measure] = {
-    FRICTION: Measure(_mean_power_by_speed, lambda units: units["force"]),
-    **dict.fromkeys(
-        (FASTER, AMPLITUDE, DAMPING, TWO_WAYS),
-        Measure(_equivalent_damping, lambda units: f"{units['force']}*s/{units['displacement']}"),
-    ),
-    **dict.fromkeys((HARDENING, SOFTENING, PLAY), _GAINED),
-}
-"""Of friction the energy that it takes, by the way; of damping what it adds to a dashpot; of springs that grow harder
-or softer the stiffness that they gain beyond that of small motions (least squares); of all others the rms of force."""
-_AS_GOOD_AS_REST = 1e-4
-"""Displacement that counts as a small motion, as a share of the largest."""
-
-
 def size_of_class(
     kind: str, members: Sequence[Member], model: Structure, motion: Residual, dt: float, units: Units
 ) -> Estimate | None:
@@ -90,23 +40,19 @@ def size_of_class(
     The value is the mean over members by probability; the interval holds that of every member. None for sensors, and
     where motions cannot be told.
     """
-    measure = _OF_CLASS.get(kind, _FORCE)
     laws = [m for m in members if isinstance(m.trial.parts[m.which], AbstractTerm)]
     if not laws:
         return None
-    along = motion.displacement, motion.velocity, dt * np.arange(motion.displacement.size)
-    found = np.array([_size(m, model, measure, *along) for m in laws])
+    found = np.array([_size(m, model, kind, motion.displacement, motion.velocity, dt) for m in laws])
     if not np.all(np.isfinite(found)):
         return None
     weights = np.array([m.probability for m in laws])
     value, errors = float(np.average(found[:, 0], weights=weights)), _Z * found[:, 1]
     low, high = float(np.min(found[:, 0] - errors)), float(np.max(found[:, 0] + errors))
-    return Estimate(value, low, high, measure.unit(units))
+    return Estimate(value, low, high, size_unit(kind, units))
 
 
-def _size(
-    member: Member, model: Structure, measure: Measure, d: np.ndarray, w: np.ndarray, time: np.ndarray
-) -> tuple[float, float]:
+def _size(member: Member, model: Structure, kind: str, d: np.ndarray, w: np.ndarray, dt: float) -> tuple[float, float]:
     """Size of one law, and its standard error by the covariance of its numbers."""
     t, part = member.trial, member.trial.parts[member.which]
     assert isinstance(part, AbstractTerm)
@@ -116,20 +62,10 @@ def _size(
     thetas = np.repeat(np.asarray(t.theta, float)[None], len(own) + 1, 0)
     thetas[1 + np.arange(len(own)), own] += steps
     rows = np.array([_numbers(t, part, own, theta) for theta in thetas])
-    forces = forces_of_law(type(part), rows, d, w, time)
-    if measure is _GAINED and not part.states:
-        forces = forces - _about_rest(part, rows, float(np.max(np.abs(d))))[:, None] * d
-    sizes = np.array([measure.of(force, d, w) for force in forces])
+    sizes = sizes_along(kind, type(part), rows, d, w, dt)
     slope = (sizes[1:] - sizes[0]) / steps
     variance = slope @ t.covariance[np.ix_(own, own)] @ slope
     return float(sizes[0]), math.sqrt(max(float(variance), 0.0))
-
-
-def _about_rest(part: AbstractTerm, rows: np.ndarray, peak: float) -> np.ndarray:
-    """Stiffness (rows,) of small motions."""
-    d = _AS_GOOD_AS_REST * peak * np.array([1.0, -1.0])
-    force = forces_of_law(type(part), rows, d, np.zeros(2), np.arange(2.0))
-    return (force[:, 0] - force[:, 1]) / (d[0] - d[1])
 
 
 def _numbers(t: Trial, part: AbstractTerm, own: Sequence[int], theta: np.ndarray) -> list[float]:

@@ -16,6 +16,10 @@ from .force_shape import Shape
 
 _GO_ON = "Let the search go on to its end before the model is changed."
 _NO_GAIN = "Do not change the model for the sake of its predictions: on held-out readings it gains no more than chance."
+_OPEN_LAW = (
+    "Use the refitted values: of the laws that were tried none has the same numbers in every motion. Fit one to a test "
+    "with the motions that the model is to predict."
+)
 _ADVICE = {
     "consistent": "Keep the model as it is.",
     "parameters": "Use the refitted values.",
@@ -65,6 +69,8 @@ def verdict_advice(decision: Decision, gain: Gain | None, evidence: Evidence) ->
         return _GO_ON
     if decision.verdict in ("cause", "parameters") and gain is not None and not gain.significant:
         return _NO_GAIN
+    if decision.of_a_class_alone:
+        return _OPEN_LAW
     far = _too_far(decision, evidence)
     if far:
         given = f"{far[0].partition('@')[0]}=2"
@@ -106,7 +112,7 @@ def finding_sentence(finding: Finding, known: Mapping[str, Cause]) -> str:
 def _how_much(finding: Finding) -> str:
     """How sure a class is, and its size with the interval, in words."""
     size = finding.size
-    about = "" if size is None else f", about {size.value:.3g} {size.unit} [{size.low:.3g}, {size.high:.3g}]"
+    about = "" if size is None else f", about {size.value:.4g} {size.unit} [{size.low:.4g}, {size.high:.4g}]"
     return f" ({finding.kind_probability:.0%}){about}"
 
 

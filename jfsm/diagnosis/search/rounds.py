@@ -3,12 +3,13 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 
 import jax
 import numpy as np
 
 from ..._limit import Limit
-from ...structures import ChannelDelay, ForceDelay
+from ...structures import Cause, ChannelDelay, ForceDelay
 from ..channels.clock import in_its_time
 from ..channels.coloured_noise import coloured
 from ..channels.delays import gain_of_delay, seems_late, slightly_late
@@ -48,6 +49,12 @@ class Searched:
     @property
     def every(self) -> list[Trial]:
         return [self.given, self.refitted, *self.trials]
+
+    @property
+    def causes(self) -> dict[str, Cause]:
+        """Every cause that was looked for, by its id."""
+        looked = chain(self.trials, self.behind, self.left_out)
+        return {effect.cause.id: effect.cause for one in looked for effect in one.effects}
 
     def judged_in(self, problem: Problem, given: Trial, refitted: Trial, trials: list[Trial]) -> "Searched":
         """What was found, with these trials of another problem; those that were not fitted there are left behind."""

@@ -292,6 +292,21 @@ CHECKS: Mapping[str, Kind] = {
         "A law that is not of the right shape closes half of the held-out error; its class is named then.",
         ("half",),
     ),
+    "class_found_again": Kind(
+        "confirmed",
+        ">=",
+        "share of excess power",
+        "If it closes less, its numbers may turn on the motion: a law of its class, fitted to held-out readings alone, "
+        "explains nearly all of what the refitted model leaves there.",
+        ("nearly_all",),
+    ),
+    "class_as_large_again": Kind(
+        "confirmed",
+        "<=",
+        "ratio",
+        "What the laws of the class have in common is as large there as in what was fitted; the class is named then.",
+        ("differs",),
+    ),
 }
 """In the order of the stages."""
 

@@ -59,10 +59,30 @@ def _of_its_class(decision: Decision, hearing: "_Hearing") -> Decision | None:
             f"closes {errors.closed:.0%} of the error on held-out readings; {least:.0%} are needed of a law of the "
             "right class alone"
         )
-        if bench.check("class_closes_half", near, errors.closed, least, says).passed:
+        if bench.check("class_closes_half", near, errors.closed, least, says).passed or _found_again(near, bench):
             reasons = {**decision.reasons, near: _NEAR}
             return replace(decision, verdict="cause", winner=near, reasons=reasons, stopped_by=None)
     return None
+
+
+def _found_again(near: str, bench: Bench) -> bool:
+    """Whether held-out readings alone show the class of a law again, and as large: of a law that is not of the right
+    shape the numbers turn on the motion."""
+    again, limits = bench.evidence.found_again(near), bench.limits
+    if again is None:
+        return False
+    says = (
+        f"{again.law}, fitted to the held-out readings alone, explains {again.explains:.0%} of what the refitted model "
+        f"leaves there; {limits.nearly_all:.0%} are needed of a class whose laws have other numbers there"
+    )
+    if not bench.check("class_found_again", near, again.explains, limits.nearly_all, says).passed:
+        return False
+    most = 1.0 + limits.differs
+    says = (
+        f"is {again.size:.4g} large on the held-out readings and {again.before:.4g} in what was fitted; "
+        f"{most:.3g} times that at most"
+    )
+    return bool(bench.check("class_as_large_again", near, again.apart, most, says).passed)
 
 
 class _Hearing:

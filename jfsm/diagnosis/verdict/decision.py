@@ -90,6 +90,11 @@ class Decision:
         every = self.factors.get(key, ())
         return product_of([factor for factor in every if not factor.name.startswith((SHAPE, EXPLAINED))])
 
+    @property
+    def of_a_class_alone(self) -> bool:
+        """Whether a class is found whose law has other numbers in other motions: as it was fitted it predicts none."""
+        return any(row.name == "class_as_large_again" and row.passed and row.of == self.winner for row in self.checks)
+
     def less_sure(self, name: str, size: float = 0.5) -> "Decision":
         """The decision less sure of every cause, half as sure by default."""
         factors = {
