@@ -223,6 +223,29 @@ def test_dry_friction_under_an_imposed_motion_is_friction():
     assert abs(d.findings[0].parameters["F"].value - 2.0) < 0.02
 
 
+@pytest.mark.slow
+def test_of_friction_that_turns_over_early_the_class_is_named_and_the_law_is_open():
+    """In another motion every law of the class has other numbers, and runs as wrong as none; the class is as large."""
+    size, lead, width = 300.0, 2.0, 0.01
+
+    def measured(amplitude, hertz, samples, seed):
+        rng, time = np.random.default_rng(seed), np.arange(samples) / 250.0
+        x = amplitude * np.minimum(1.0, time) * np.sin(2 * np.pi * hertz * time)
+        v = np.gradient(x, time)
+        force = size * np.tanh((v + lead * x) / width) + 40.0 * v + 8000.0 * x
+        force, x = force + 1.2 * rng.standard_normal(samples), x + 1e-6 * rng.standard_normal(samples)
+        return jfsm.Record(time, force=force, displacement=x, drive="motion")
+
+    link = (0, 1)
+    model = jfsm.Structure([0.0], [jfsm.LinearStiffness(6000.0, at=link), jfsm.LinearDamping(100.0, at=link)])
+    held = [measured(0.003, 4.0, 500, 6)]
+    d = jfsm.diagnose(measured(0.02, 0.8, 2500, 5), model, holdout=held, key=jax.random.key(0))
+    (found,) = d.findings
+    assert d.verdict == "cause" and found.kind == "dry friction" and found.law_open
+    assert found.size.value == pytest.approx(size, rel=0.15)
+    assert d.gain.after <= 1.001 * d.gain.refitted and "refitted" in d.advice  # the law itself would run worse
+
+
 def test_nothing_wrong_is_consistent_and_a_wrong_value_is_named():
     d = jfsm.diagnose(on_rig(LINEAR + 0.2), MODEL, causes=CAUSES, key=jax.random.key(0))
     assert d.verdict == "consistent" and not d.findings
