@@ -22,8 +22,10 @@ class Segment:
     ----------
     above : list of Line
         What stands above, without blank lines.
-    first, last : int
-        Lines between which the rows lie.
+    opening : Line
+        The first row.
+    last : int
+        The line of the last row.
     start, count : int
         Where they lie in the table, and how many they are.
     skipped : set of int
@@ -37,7 +39,7 @@ class Segment:
     """
 
     above: list[Line]
-    first: int
+    opening: Line
     start: int
     last: int = 0
     count: int = 0
@@ -46,6 +48,11 @@ class Segment:
     comments: list[Line] = field(default_factory=list)
     extra: list[Line] = field(default_factory=list)
     below: list[Line] = field(default_factory=list)
+
+    @property
+    def first(self) -> int:
+        """The line of the first row."""
+        return self.opening[0]
 
 
 class Table:
@@ -151,7 +158,7 @@ class Table:
             self._waiting.insert(0, self._broken)
             self._broken, begins = None, True
         if begins:
-            self.segments.append(Segment(self._waiting, number, self._rows))
+            self.segments.append(Segment(self._waiting, (number, line), self._rows))
         else:
             self.segments[-1].comments += self._waiting
             self.segments[-1].skipped |= {at for at, _ in self._waiting}
