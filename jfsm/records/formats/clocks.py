@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from jfsm.records._units import find_unit
 from jfsm.records.formats.base import Contents
 from jfsm.records.formats.lookup import Choice, choose, listed, samples_of
+from jfsm.records.formats.preambles import names_rate, rate_by_name
 from jfsm.records.formats.stamps import (
     PACKED_DATE,
     Instants,
@@ -23,8 +24,6 @@ from jfsm.records.formats.ticks import mended
 
 Seconds = NDArray[np.float64]
 
-_RATE_NAME = re.compile(r"fs|sampl(?:e|es|ing)?(?:rate|freq|frequency)|(?:data|scan)rate|abtast(?:rate|frequenz)")  # Hz
-_STEP_NAME = re.compile(r"dt|ts|delta[tx]|sampl(?:e|ing)(?:interval|period|time)|timestep|tsample|wfincrement")  # s
 DATE_NAMES = ("date", "datum", "fecha")
 _WORDS = "time|zeit|temps|tiempo|tempo|tid|tijd|uhrzeit|laufzeit|čas|czas|время|时间|時間|elapsed|tout"
 _AHEAD = "running|elapsed|relative|test|total|rel|sample|sampling|sensor|system|measurement"
@@ -148,14 +147,22 @@ class _Finder:
             )
         even = next((name for name in islice(contents.arrays, LIKELY) if self._is_ramp(name)), None)
         hint = f" {even!r} grows evenly, and may be the clock." if even is not None else ""
+        if choice is not None and choice.column is None and self._has_instants(choice):
+            hint = (
+                f" The first column of {choice.array!r} grows evenly: ask for '{choice.array}[1]' if it holds instants."
+            )
         raise ValueError(
             f"{self._source} must say when its samples were taken; it holds {listed(contents.arrays)}.{hint} "
             f'Pass time="..." or rate=... [Hz].'
         )
 
     def _guessed(self, choice: Choice) -> Clock | None:
-        """The only array that has a word for time in its name and grows, or the only rate in the file, with a note."""
+        """What may be the clock, with a note: the first column of the channel's matrix, the only array that grows and
+        has a word for time in its name, the only rate in the file.
+        """
         contents = self._contents
+        if (instants := self._first_column(choice)) is not None:
+            return instants
         called = [
             name
             for name in contents.arrays
@@ -165,28 +172,36 @@ class _Finder:
             column = choose(contents, self._source, "time", called[0])
             clock = self._once(called[0], lambda: _of_column(contents, self._source, column, self._units))
             return clock._replace(notes=(f"{called[0]!r} is taken for the clock.", *clock.notes))
-        rates = [(name, rate) for name in contents.arrays if (rate := _stated_by(contents, name)) is not None]
-        if len(rates) == 1:
-            (name, rate), size = rates[0], samples_of(contents, self._source, choice).shape[0]
-            note = f"Counted by the only rate that the file states: {name!r}, {rate:.9g} Hz."
-            return self._once(
-                ("only", size), lambda: Clock(_counted(contents, self._source, [choice], rate), (), None, (note,))
-            )
-        return None
+        rates = {name: rate for name in contents.arrays if (rate := _stated_by(contents, name)) is not None}
+        if len(rates) != 1:
+            return None
+        name, rate = rates.popitem()
+        size = samples_of(contents, self._source, choice).shape[0]
+        note = f"Counted by the only rate that the file states: {name!r}, {rate:.9g} Hz."
+        return self._once(
+            ("only", size), lambda: Clock(_counted(contents, self._source, [choice], rate), (), None, (note,))
+        )
 
     def _is_ramp(self, name: str, *, evenly: bool = True) -> bool:
         """Whether an array grows from sample to sample, by equal steps if that is asked for."""
         try:
-            values = np.asarray(self._contents.arrays[name])
+            return _grows(np.asarray(self._contents.arrays[name]), evenly)
         except ValueError:  # text
             return False
-        if values.ndim != 1 or values.size < 3 or values.dtype.kind not in "iuf":
-            return False
-        steps = np.diff(values.astype(np.float64))
-        if not evenly:
-            return bool(np.all(steps > 0))
-        counts_rows = bool(np.all(steps == 1.0))
-        return bool(np.all(steps > 0)) and not counts_rows and float(np.ptp(steps)) <= 1e-3 * float(steps.mean())
+
+    def _has_instants(self, choice: Choice) -> bool:
+        is_matrix = samples_of(self._contents, self._source, choice).ndim == 2
+        return is_matrix and self._first_column(choice._replace(column=1)) is not None
+
+    def _first_column(self, choice: Choice) -> Clock | None:
+        """The first column of the matrix of a channel, as Simulink saves arrays with time, if it grows evenly."""
+        if not choice.column:
+            return None
+        instants = samples_of(self._contents, self._source, choice._replace(column=0, sign=1.0))
+        note = f"The first column of {choice.array!r} grows evenly and is taken for the instants, in seconds."
+        if not _grows(instants, evenly=True):
+            return None
+        return self._once(("matrix", choice.array), lambda: Clock(instants.astype(np.float64), (), None, (note,)))
 
     def of_rows(self, choice: Choice) -> Clock:
         """The clock of a channel over the rows of a table in which it has readings, if others have more of them."""
@@ -273,6 +288,16 @@ class _Finder:
             return True
 
 
+def _grows(values: NDArray, evenly: bool) -> bool:
+    """Whether numbers grow from one to the next; evenly by steps that are alike and do not number rows."""
+    if values.ndim != 1 or values.size < 3 or values.dtype.kind not in "iuf":
+        return False
+    steps = np.diff(values.astype(np.float64))
+    if not evenly or not np.all(steps > 0):
+        return bool(np.all(steps > 0))
+    return not bool(np.all(steps == 1.0)) and float(np.ptp(steps)) <= 1e-3 * float(steps.mean())
+
+
 def _own_rows(samples: NDArray) -> NDArray[np.int64] | None:
     """Rows of a channel that ends before the table or stands in every second, third row; None where it has all.
 
@@ -313,7 +338,7 @@ def _of_column(contents: Contents, source: str, column: Choice, units: Mapping[s
     factor = _seconds(since["unit"] if since else unit) if unit else None
     instants = _instants(contents, source, column, factor)
     if since and instants.begins is None:
-        dated = instants_of_texts(np.array([since["date"] if ":" in since["date"] else f"{since['date']} 00:00"]))
+        dated = instants_of_texts(np.array(2 * [since["date"] if ":" in since["date"] else f"{since['date']} 00:00"]))
         instants = instants._replace(begins=dated.begins if dated else None)
     seconds, notes = mended(instants.seconds)
     if factor is not None and instants.begins is None and seconds.size > 2:
@@ -405,14 +430,10 @@ def _number(contents: Contents, around: str) -> float | None:
 
 def _stated_by(contents: Contents, name: str) -> float | None:
     """The rate that an array gives by its name, if it is one number."""
-    word = re.sub(r"[^a-z]", "", re.split(r"[./]", name)[-1].lower())
-    is_step = _STEP_NAME.fullmatch(word) is not None
-    if not is_step and not _RATE_NAME.fullmatch(word):
+    if not names_rate(name):
         return None
     given = np.asarray(contents.arrays[name])
-    if given.size != 1 or given.dtype.kind not in "iuf" or not float(given.item()) > 0:
-        return None
-    return 1.0 / float(given.item()) if is_step else float(given.item())
+    return rate_by_name(name, float(given.item())) if given.size == 1 and given.dtype.kind in "iuf" else None
 
 
 def _counted(contents: Contents, source: str, chosen: Sequence[Choice], rate: float) -> Seconds:

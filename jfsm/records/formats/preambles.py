@@ -21,6 +21,8 @@ _RATE_UNITS = {"hz": 1.0, "khz": 1e3, "mhz": 1e6, "s/s": 1.0, "sps": 1.0, "sa/s"
 _RATE_UNITS |= dict.fromkeys(
     ("scans/s", "scans/sec", "samples/s", "samples/sec", "samples/second", "samples per second", "per second"), 1.0
 )
+_RATE_NAME = re.compile(r"fs|sampl(?:e|es|ing)?(?:rate|freq|frequency)|(?:data|scan)rate|abtast(?:rate|frequenz)")  # Hz
+_STEP_NAME = re.compile(r"dt|ts|delta[tx]|sampl(?:e|ing)(?:interval|period|time)|timestep|tsample|wfincrement")  # s
 _VALUE = r"""(?:_(?P<joined>hz|khz|s|ms|us))?["']?\s*(?:[\[(](?P<before>[^\])]*)[\])])?\s*["']?
              (?:\s*[:=;,\t ])+\s*["']?\s*(?P<value>[-+]?\d[\d.,]*(?:[eE][-+]?\d+)?)\s*["']?
              (?P<apart>[;,\t\ ]*)\s*["']?[\[(]?(?P<after>(?:1/)?[A-Za-zµ/]+(?:\ per\ second)?)?"""
@@ -47,6 +49,23 @@ def stated_rate(lines: Iterable[str]) -> StatedRate | None:
             words = " ".join(match.group().strip(" ;,\t#%\"'([:=").split())
             return StatedRate(value * size if kind == "rate" else 1.0 / (value * size), words)
     return None
+
+
+def names_rate(name: str) -> bool:
+    """Whether a variable, field or attribute is called as sampling rates or steps are: ``run.Fs``, ``Sample_Rate``."""
+    word = _letters(name)
+    return bool(_RATE_NAME.fullmatch(word) or _STEP_NAME.fullmatch(word))
+
+
+def rate_by_name(name: str, value: float) -> float | None:
+    """The rate [Hz] that a number gives which is so called; None if it is not positive."""
+    if not value > 0:
+        return None
+    return 1.0 / value if _STEP_NAME.fullmatch(_letters(name)) else value
+
+
+def _letters(name: str) -> str:
+    return re.sub(r"[^a-z]", "", re.split(r"[./]", name)[-1].lower())
 
 
 def _joined(lines: Iterable[str]) -> Iterator[str]:

@@ -21,6 +21,8 @@ _KNOWN: tuple[tuple[bytes, str, str], ...] = (
     (b"CDF\x02", "a netCDF 3 file", "Convert it to netCDF 4 (nccopy -k nc4)."),
     (b"SQLite format 3", "an SQLite database", "Export the table as text."),
     (b"\x80\x04\x95", "a Python pickle, which could run anything", "Save the arrays by numpy.savez."),
+    (b"\x80\x05\x95", "a Python pickle, which could run anything", "Save the arrays by numpy.savez."),
+    (b"\x80\x03c", "a Python pickle, which could run anything", "Save the arrays by numpy.savez."),
 )
 
 

@@ -1,17 +1,12 @@
 """The rows of a text as columns of doubles, and what stands between them."""
 
-import re
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from jfsm.records.formats.numbers import is_gap, is_number
+from jfsm.records.formats.numbers import is_gap, is_number, is_summary
 from jfsm.records.formats.text.layout import Layout, fields_of, is_comment, values_of
 from jfsm.records.formats.text.lines import Line, TextFile
-
-_SUMMARY = re.compile(
-    r"(min|max|mean|average|avg|std|stdev|rms|sum|median|range|count|minimum|maximum|mittelwert|summe|end|eof)\b", re.I
-)
 
 
 @dataclass
@@ -197,7 +192,7 @@ class Table:
     def _is_broken(self, fields: list[str]) -> bool:
         """Whether fields are rather a damaged row than a title or a summary."""
         numbers = sum(map(is_number, fields))
-        if _SUMMARY.match(fields[0]):
+        if is_summary(fields[0]):
             return False
         if len(fields) == self._layout.width:
             return bool(numbers) and not fields[0][:1].isalpha()
