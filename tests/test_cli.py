@@ -817,7 +817,11 @@ def test_a_file_that_says_nothing_of_its_channels_is_listed_with_the_command_to_
     assert proposal == f"jfsm diagnose '{path}' --force Kraft --displacement Weg --model MODEL.toml"
     assert "must say when" not in result.stdout
     result = run("inspect", path, "--out-units", "in,lbf")
-    assert result.exit_code == 0 and "numbers above are as they stand in the file" in flat(result.stderr)
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert re.search(r"2 +Kraft +lbf +force +40 +100 +0.39 +0 to 8768\b", result.stdout)
+    assert re.search(r"LVDT +V +displacement +40 +100 +0.39 +-36 to 3\b", result.stdout)
+    result = run("inspect", path, "--since", "0.1", "--every", "2")
+    assert "channels must be named for --since, --every" in flat(result.stderr)
     assert "furlong" in refusal("inspect", path, "--out-units", "furlong")
 
 

@@ -172,10 +172,13 @@ class _Finder:
             column = choose(contents, self._source, "time", called[0])
             clock = self._once(called[0], lambda: _of_column(contents, self._source, column, self._units))
             return clock._replace(notes=(f"{called[0]!r} is taken for the clock.", *clock.notes))
-        rates = {name: rate for name in contents.arrays if (rate := _stated_by(contents, name)) is not None}
+        if choice.column is None and self._has_instants(choice):
+            return None
+        stated = ((name, _stated_by(contents, name)) for name in contents.arrays)
+        rates = [(name, rate) for name, rate in stated if rate is not None]
         if len(rates) != 1:
             return None
-        name, rate = rates.popitem()
+        name, rate = rates[0]
         size = samples_of(contents, self._source, choice).shape[0]
         note = f"Counted by the only rate that the file states: {name!r}, {rate:.9g} Hz."
         return self._once(

@@ -14,7 +14,6 @@ _KNOWN: tuple[tuple[bytes, str, str], ...] = (
     (b"\x89PNG", "a picture", "Export the numbers as text."),
     (b"\xff\xd8\xff", "a picture", "Export the numbers as text."),
     (b"GIF8", "a picture", "Export the numbers as text."),
-    (b"\xa3\x95\x80", "an ArduPilot log", "Convert it: `mavlogdump.py --format csv --types IMU FILE > imu.csv`."),
     (b"H Product:Blackbox", "a Betaflight log", "Convert it: `blackbox_decode FILE` writes csv."),
     (b"DIAdem", "a DIAdem file", "Export it from DIAdem as TDMS or text."),
     (b"CDF\x01", "a netCDF 3 file", "Convert it to netCDF 4 (nccopy -k nc4)."),

@@ -58,7 +58,8 @@ def _ramp(seconds: Seconds) -> tuple[Seconds | None, float]:
         return None, 0.0
     index = np.arange(seconds.size) - 0.5 * (seconds.size - 1)
     slope, start = np.polyfit(index, seconds, 1)
-    for step in (slope, 1 / float(f"{1 / slope:.3g}"), float(f"{slope:.3g}")):  # a rate or a step is a short number
+    short = [step for d in (3, 2, 1) for step in (1 / float(f"{1 / slope:.{d}g}"), float(f"{slope:.{d}g}"))]
+    for step in (slope, *short):  # a rate or a step is a number of few digits
         ramp = start + step * index
         if np.ptp(seconds - ramp) <= resolution * (1 + 1e-6):
             return ramp, resolution
