@@ -775,7 +775,8 @@ def test_refusals_of_a_file_speak_of_options(tmp_path):
     (tmp_path / "d.csv").write_text("t [s],F\n" + uneven)
     Structure.sdof(1.0, 9.0, 0.1).save(tmp_path / "m.toml")
     options = ["--force", "F", "--model", tmp_path / "m.toml", "--out", tmp_path / "o.csv"]
-    assert "Make them so first: --resample " in refusal("simulate", tmp_path / "d.csv", *options)
+    text = refusal("simulate", tmp_path / "d.csv", *options)
+    assert re.search(r"Make them so first: --resample [\d.]+, or --resample auto\.", text)
     text = refusal("simulate", tmp_path / "b.csv", *options[2:], "--rate", 10)
     assert "as --force NAME, --displacement NAME" in text
 

@@ -144,7 +144,7 @@ def test_the_demonstration_finds_the_friction_that_it_hid(seed, tmp_path):
 @pytest.mark.slow
 def test_a_measured_circuit_hardens_with_the_cube_of_its_displacement(shared_data):
     path = shared_data / "silverbox" / "silverbox_multisine.npz"
-    shown = measured(path, force="u", displacement="y", units={"u": "V", "y": "V"}, most=3000)
+    shown = measured(read(path, force="u", displacement="y", units={"u": "V", "y": "V"}), most=3000)
     d = diagnose(shown.record, shown.model, shown.holdout, key=jax.random.key(0))
     assert [finding.cause for finding in d.findings] == ["cubic_hardening"]
     assert d.gain is not None and d.gain.closed > 0.9

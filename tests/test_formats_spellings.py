@@ -2,6 +2,7 @@
 
 import datetime
 import json
+from typing import Any
 
 import h5py
 import numpy as np
@@ -14,7 +15,7 @@ N = 40
 I = np.arange(N)  # noqa: E741
 T, F, X = I / 200, 20 * np.sin(0.3 * I), 4 * np.cos(0.3 * I)
 START = datetime.datetime(2025, 11, 14, 20, 9, 0, 563811)
-ASKED = {"force": "F", "displacement": "x"}
+ASKED: dict[str, Any] = {"force": "F", "displacement": "x"}
 
 
 def rows(clock=None):
@@ -155,7 +156,8 @@ def test_instants_beside_the_samples_count_before_a_rate_in_an_attribute_of_hdf5
 def _pandas(orient):
     import pandas as pd
 
-    return json.loads(pd.DataFrame({"t": T, "F": F, "x": 1e-3 * X}).to_json(orient=orient, double_precision=15))
+    frame: Any = pd.DataFrame({"t": T, "F": F, "x": 1e-3 * X})
+    return json.loads(frame.to_json(orient=orient, double_precision=15))
 
 
 @pytest.mark.parametrize("orient", ["split", "columns", "index", "records", "table"])
@@ -187,8 +189,9 @@ def test_a_frame_of_texts_with_a_row_of_units(tmp_path):
 def test_rows_that_sum_up_a_sheet_are_left_out(tmp_path):
     openpyxl = pytest.importorskip("openpyxl")
     book = openpyxl.Workbook()
+    sheet: Any = book.active
     for row in (["time (s)", "F (N)", "x (mm)"], *zip(T, F, X, strict=True), ["Mean", 1.0, 2.0], ["Max", 3.0, 4.0]):
-        book.active.append(list(row))
+        sheet.append(list(row))
     book.save(tmp_path / "a.xlsx")
     record = read(tmp_path / "a.xlsx", **ASKED)
     is_right(record)

@@ -324,7 +324,7 @@ _IN_OPTIONS = (
     (r"`?\bat_rest=True`?", "--at-rest"),
     (r"\bPass (run|sheet)=(\d+)", r"Pass --\1 \2"),
     (r"\brecord\.resample\(rate\)", "--resample HZ"),
-    (r"\brecord\.resample\(([^)]*)\)", r"--resample \1"),
+    (r"\brecord\.resample\(([^)]*)\)", r"--resample \1, or --resample auto"),
     (r"(\b(?:jfsm|record)\.[a-z]+\([^)]*\))(?! in Python)", r"\1 in Python"),
     (r"`units`", "--unit"),
     (r"`causes`", "--cause"),

@@ -23,7 +23,7 @@ _LETTERS = {
 }  # fmt: skip
 _IMPLIED = {**dict.fromkeys("cCeE", 1e-2), "L": 1e-7}  # multipliers of letters, where the log has none of its own
 _CLOCKS = {"SampleUS": 1e-6, "TimeUS": 1e-6, "TimeMS": 1e-3}  # when the sensor read, when it was logged
-_SPELT = {"degheading": "deg", "UNKNOWN": "", "instance": ""}
+_SPELT: dict[str, str] = {"degheading": "deg", "UNKNOWN": "", "instance": ""}
 
 
 @dataclass
@@ -153,7 +153,7 @@ def _described(data: bytes, types: Mapping[int, _Type]) -> tuple[dict[str, str],
     units, multipliers = dict[str, str](), dict[str, float]()
     if {"UNIT", "MULT", "FMTU"} <= set(by_name):
         for row in _rows(data, by_name["UNIT"]):
-            label = row["Label"].decode("latin-1")
+            label = str(row["Label"].decode("latin-1"))
             units[chr(row["Id"])] = _SPELT.get(label, label)
         for row in _rows(data, by_name["MULT"]):
             multipliers[chr(row["Id"])] = float(row["Mult"])
