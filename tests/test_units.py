@@ -39,7 +39,13 @@ ONE: Any = np.ones(4)
         ("acceleration", 9.80665, "m/s²", "g;G;g's;gn;gs"),
         ("acceleration", 9.80665e-3, "m/s²", "mg"),
         ("acceleration", 1e-2, "m/s²", "gal;Gal;cm/s/s;cm/sec/sec;cm/s^2"),
-        ("acceleration", 1.0, "m/s²", "m/s²;m/s2;m/s^2;m/s**2;m/s/s;m/sec^2;m.s-2;m·s⁻²;m/(s·s);m s^(-2);M/S^2;ms-2;ms⁻²;$m/s^{2}$;meters per second squared"),
+        (
+            "acceleration",
+            1.0,
+            "m/s²",
+            "m/s²;m/s2;m/s^2;m/s**2;m/s/s;m/sec^2;m.s-2;m·s⁻²;m/(s·s);m s^(-2);M/S^2;ms-2;ms⁻²;$m/s^{2}$"
+            ";meters per second squared",
+        ),
         ("velocity", 0.44704, "m/s", "mph"),
         ("displacement", np.pi / 10800, "rad", "arcmin"),
         ("acceleration", 1e-3, "m/s²", "mm/s^2;mm/s²;mm/sec2"),
