@@ -5,9 +5,7 @@ the next.
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +14,7 @@ from scipy.integrate import solve_ivp
 from scipy.signal import csd, welch
 
 from .identification import fit
-from .records import Record, read
+from .records import Record
 from .structures import Structure
 
 MASS, STIFFNESS, DAMPING, FRICTION = 1.5, 2400.0, 2.4, 8.0  # kg, N/m, N s/m, N
@@ -133,24 +131,13 @@ def _rub(drive: Multisine, time: Float[np.ndarray, " n"]) -> dict[str, Float[np.
     return {"force": force, "displacement": state[0], "velocity": state[1], "acceleration": acceleration}
 
 
-def measured(
-    path: str | Path,
-    *,
-    force: str,
-    displacement: str,
-    units: Mapping[str, str] | None = None,
-    rate: float | None = None,
-    most: int = 20_000,
-) -> Demonstration:
+def measured(record: Record, *, most: int = 20_000) -> Demonstration:
     """The first samples of a measured record, its last quarter held out, and the linear model that fits them best.
 
     Parameters
     ----------
-    path : str or Path
-    force, displacement : str
-        Names of the two channels in the file.
-    units, rate : optional
-        As for `jfsm.read`.
+    record : Record
+        One force and one displacement.
     most : int
         Samples to be diagnosed, at most.
 
@@ -160,10 +147,9 @@ def measured(
 
     Raises
     ------
-    FileNotFoundError, ValueError
-        If the file cannot be read as such a record, or shows no resonance.
+    ValueError
+        If the record shows no resonance.
     """
-    record = read(path, force=force, displacement=displacement, units=units, rate=rate)
     held = math.ceil(_HELD_OUT * len(record))
     seen, unseen = record[: min(most, len(record) - held)], record[len(record) - held :]
     linear = fit(first_guess(seen), seen).structure
@@ -172,7 +158,7 @@ def measured(
         model=linear,
         holdout=unseen,
         introduction=(
-            f"A measured record: {Path(path).name}, force in {record.units['force']}, displacement in "
+            f"A measured record: {record.name}, force in {record.units['force']}, displacement in "
             f"{record.units['displacement']}. Its first {len(seen)} samples are diagnosed, its last {len(unseen)} held "
             f"out. The model that is believed is the best linear one: mass, stiffness and damping fitted to the same "
             f"{len(seen)} samples, from a first guess off their frequency response."

@@ -240,11 +240,30 @@ def _catman(path: Path) -> dict[str, Any]:
     return ASKED
 
 
+def _ardupilot(path: Path) -> dict[str, Any]:
+    import struct
+
+    def message(kind: int, body: bytes) -> bytes:
+        return b"\xa3\x95" + bytes([kind]) + body
+
+    log = b"".join(
+        message(128, struct.pack("<BB4s16s64s", number, size, name, letters, fields))
+        for number, size, name, letters, fields in (
+            (128, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns"),
+            (10, 27, b"RIG", b"Qdd", b"TimeUS,F,x"),
+        )
+    )
+    for i, (f, x) in enumerate(zip(F, X, strict=True)):
+        log += message(10, struct.pack("<Qdd", 5000 * i, f, x))
+    path.write_bytes(log)
+    return {"force": "RIG.F", "displacement": "RIG.x", "units": {"RIG.F": "N", "RIG.x": "m"}}
+
+
 WRITERS: dict[str, Writer] = {
     writer.__name__[1:]: writer
     for writer in (
         _csv, _german, _lvm, _json, _at2, _sto, _wav, _npy, _npz, _mat, _mat73, _h5, _uff, _tdms, _xlsx, _parquet,
-        _feather, _c3d, _ulog, _bag, _mcap, _imc, _catman,
+        _feather, _c3d, _ulog, _bag, _mcap, _imc, _catman, _ardupilot,
     )
 }  # fmt: skip
 TEXT = ("csv", "german", "lvm", "json", "at2", "sto")
@@ -326,7 +345,7 @@ def tried(count: int, names: tuple[str, ...], seed: int = 0) -> Iterator[tuple[s
                 kind, edited = edits(name, original, rng)
                 path.write_bytes(edited)
                 what, words = outcome(path, asked, usual)
-                if what == "silent" and kind == "cut" and " 0 differ" in words and name in (*TEXT, "ulog"):
+                if what == "silent" and kind == "cut" and " 0 differ" in words and name in (*TEXT, "ulog", "ardupilot"):
                     what = "as stated"  # between two rows or messages: nothing shows that there were more
                 yield name, kind, what, words
 

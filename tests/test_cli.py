@@ -775,7 +775,8 @@ def test_refusals_of_a_file_speak_of_options(tmp_path):
     (tmp_path / "d.csv").write_text("t [s],F\n" + uneven)
     Structure.sdof(1.0, 9.0, 0.1).save(tmp_path / "m.toml")
     options = ["--force", "F", "--model", tmp_path / "m.toml", "--out", tmp_path / "o.csv"]
-    assert "Make them so first: --resample " in refusal("simulate", tmp_path / "d.csv", *options)
+    text = refusal("simulate", tmp_path / "d.csv", *options)
+    assert re.search(r"Make them so first: --resample [\d.]+, or --resample auto\.", text)
     text = refusal("simulate", tmp_path / "b.csv", *options[2:], "--rate", 10)
     assert "as --force NAME, --displacement NAME" in text
 
@@ -817,7 +818,11 @@ def test_a_file_that_says_nothing_of_its_channels_is_listed_with_the_command_to_
     assert proposal == f"jfsm diagnose '{path}' --force Kraft --displacement Weg --model MODEL.toml"
     assert "must say when" not in result.stdout
     result = run("inspect", path, "--out-units", "in,lbf")
-    assert result.exit_code == 0 and "numbers above are as they stand in the file" in flat(result.stderr)
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert re.search(r"2 +Kraft +lbf +force +40 +100 +0.39 +0 to 8768\b", result.stdout)
+    assert re.search(r"LVDT +V +displacement +40 +100 +0.39 +-36 to 3\b", result.stdout)
+    result = run("inspect", path, "--since", "0.1", "--every", "2")
+    assert "channels must be named for --since, --every" in flat(result.stderr)
     assert "furlong" in refusal("inspect", path, "--out-units", "furlong")
 
 

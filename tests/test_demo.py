@@ -24,7 +24,7 @@ from jfsm.demo import (
     hidden_friction,
     measured,
 )
-from jfsm.records import noise_floor
+from jfsm.records import noise_floor, read
 
 DRIVE = Multisine(8.0, 2 * math.pi * np.array([2.0, 5.0, 6.4, 9.0]), np.array([0.3, 1.9, 4.0, 5.5]))
 TIME = np.arange(1200) / RATE
@@ -120,13 +120,13 @@ def test_a_record_without_a_displacement_allows_no_first_guess():
 def test_a_measured_record_is_diagnosed_at_its_beginning_and_judged_on_its_last_quarter(tmp_path):
     record = linear_record(801)
     record.write(tmp_path / "run.npz")
-    shown = measured(tmp_path / "run.npz", force="force_1", displacement="displacement_1", most=500)
+    shown = measured(read(tmp_path / "run.npz", force="force_1", displacement="displacement_1"), most=500)
     assert isinstance(shown.holdout, Record)
     assert (len(shown.record), len(shown.holdout)) == (500, 201)
     assert shown.holdout.time[-1] == record.time[-1]
     assert "first 500 samples" in shown.introduction and "last 201" in shown.introduction
     assert shown.model.values()["mass@1"] == pytest.approx(3.0, rel=0.02)
-    whole = measured(tmp_path / "run.npz", force="force_1", displacement="displacement_1")
+    whole = measured(read(tmp_path / "run.npz", force="force_1", displacement="displacement_1"))
     assert len(whole.record) == 600  # what is held out is never fitted
 
 
@@ -144,7 +144,7 @@ def test_the_demonstration_finds_the_friction_that_it_hid(seed, tmp_path):
 @pytest.mark.slow
 def test_a_measured_circuit_hardens_with_the_cube_of_its_displacement(shared_data):
     path = shared_data / "silverbox" / "silverbox_multisine.npz"
-    shown = measured(path, force="u", displacement="y", units={"u": "V", "y": "V"}, most=3000)
+    shown = measured(read(path, force="u", displacement="y", units={"u": "V", "y": "V"}), most=3000)
     d = diagnose(shown.record, shown.model, shown.holdout, key=jax.random.key(0))
     assert [finding.cause for finding in d.findings] == ["cubic_hardening"]
     assert d.gain is not None and d.gain.closed > 0.9

@@ -10,15 +10,17 @@ import numpy as np
 import pytest
 
 from jfsm.records import read
-from jfsm.records.formats.hdf5_texts import _reference, numbers_of, text_of
+from jfsm.records.formats.hdf5_texts import _references, numbers_of, text_of, texts_of
 
 N = 40
 
 
-def _file(path, **how):
+def _file(path, more=0, **how):
     with h5py.File(path, "w", **how) as file:
         for name, unit in (("time", "s"), ("F", "kN"), ("x", "mm")):
             file[name] = np.arange(1.0 * N)
+            for place in range(more):
+                file[name].attrs[f"more{place}"] = place
             file[name].attrs["units"] = unit
     return path
 
@@ -59,11 +61,35 @@ def test_texts_of_variable_length_are_found_in_headers_of_either_version(tmp_pat
     path = _file(tmp_path / "a.h5", **how)
     with h5py.File(path) as file, path.open("rb") as stream:
         address = h5py.h5o.get_info(file["x"].id).addr
-        reference = _reference(stream, file.userblock_size, address, b"units")
+        reference = _references(stream, file.userblock_size, address, b"units", 1)
         assert reference is not None and struct.unpack("<IQI", reference)[::2] == (2, 3)
         file_texts = [text_of(file[name], "units") for name in ("time", "F", "x")]
         assert file_texts == ["s", "kN", "mm"]
         assert text_of(file["F"], "unit") == "" and numbers_of(file["F"], "units").size == 0
+
+
+def test_texts_of_objects_with_many_attributes_are_found_by_their_names(tmp_path):
+    """Newer files keep more than eight attributes apart from the header."""
+    path = _file(tmp_path / "a.h5", more=12, libver="latest")
+    with h5py.File(path) as file, path.open("rb") as stream:
+        address = h5py.h5o.get_info(file["x"].id).addr
+        assert _references(stream, 0, address, b"units", 1) is None
+        assert text_of(file["x"], "units") == "mm"
+    content = path.read_bytes()
+    path.write_bytes(_long_text(content))
+    with h5py.File(path) as file, pytest.raises(ValueError, match="'units' of '/[a-zA-Z]+' is damaged"):
+        text_of(file["x"], "units")
+
+
+def test_several_texts_of_one_attribute(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["data"] = np.stack([0.005 * np.arange(N), np.arange(N), 2.0 * np.arange(N)], 1)
+        file["data"].attrs["columns"] = np.array(["time", "F", "x"], dtype=object)
+        file["data"].attrs["units"] = np.array(["s", "kN", "mm"], dtype=object)
+        assert texts_of(file["data"], "columns") == ["time", "F", "x"]
+    record = read(tmp_path / "a.h5", force="F", displacement="x")
+    assert record.sample_rate == 200 and record.channels["force", 1][1] == 1e3
+    assert record.channels["displacement", 1][1] == 2e-3
 
 
 def test_damaged_texts_are_refused_before_the_library_reads_them(tmp_path):

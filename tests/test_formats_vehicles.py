@@ -179,7 +179,6 @@ def test_more_frames_than_the_header_can_say_are_read(tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
-        ("00000012.BIN", b"\xa3\x95\x80\x80\x59FMT\0BBnNZ\0", "is an ArduPilot log.*mavlogdump.py"),
         ("run.dxd", b"\x01\x02\0\x03\0", "is a Dewesoft file that does not begin as one.*Export it from DewesoftX"),
         ("run.dxz", b"PK\x03\x04\0", "is a packed Dewesoft file.*Export it from DewesoftX"),
         ("run.tdm", b"PK\x03\x04\0", "is a DIAdem file.*TDMS"),

@@ -1,6 +1,7 @@
 """Motion from whatever was measured of it: against motions made by SciPy, and the smoother against plain algebra."""
 
 import re
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 import jfsm
 from jfsm.estimation._kalman import LinearModel, log_likelihood, smoothed
+from jfsm.estimation._motion import Motion, _untold
 
 DT = 0.04
 KINDS = ("displacement", "velocity", "acceleration")
@@ -193,3 +195,24 @@ def test_what_the_model_says_of_its_sensors_is_undone(hardening):
     model = model + jfsm.AccelerationGain(0.1, at=("acceleration", 1))
     found = jfsm.estimate_motion(jfsm.Record(TIME, noisy(force(TIME), 0.01, 9), **channels), model)
     assert errors(found, hardening)[2] < 0.008
+
+
+@pytest.mark.parametrize(("kind", "times"), [("velocity", 1), ("acceleration", 2)])
+def test_a_shift_that_the_estimate_leaves_out_is_said_where_noise_alone_does_not_make_it(kind, times):
+    time = 0.01 * np.arange(1500)
+    swing, shift = 0.02 * np.sin(9 * time), 0.05 * (1 + np.tanh((time - 7) / 0.4))
+    for motion, estimate, is_said in (
+        (swing + shift, swing, True),
+        (swing + shift, swing + shift, False),
+        (swing, swing, False),
+    ):
+        readings = motion
+        for _ in range(times):
+            readings = np.gradient(readings, 0.01)
+        level = 0.01 * np.std(readings)
+        readings = readings + level * np.random.default_rng(0).standard_normal(time.size)
+        column = estimate[:, None]
+        found = Motion(time, column, column, column, np.zeros((1500, 1, 3, 3)), {kind: np.array([level])}, {}, {}, {})
+        channels: dict[str, Any] = {kind: readings}
+        notes = _untold(found, jfsm.Record(time, **channels))
+        assert any("does not tell apart" in note for note in notes) == is_said

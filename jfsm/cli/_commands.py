@@ -1,5 +1,6 @@
 """The commands."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -8,13 +9,11 @@ import typer
 from ._believed import Joints, ModelFile, load, save
 from ._command import FOUND, NOT_FINISHED, command
 from ._input import (
-    CHANNELS,
-    Rate,
+    Channels,
     RecordFile,
     RecordFiles,
     Seed,
     ShownUnits,
-    Units,
     check_outputs,
     is_even,
     link,
@@ -22,7 +21,6 @@ from ._input import (
     random_key,
     shown_units,
     takes_record,
-    units,
 )
 from ._laws import OwnLaws, causes_named, run_laws
 from ._output import progress, said_in_options, say, show_listing, show_table
@@ -44,14 +42,14 @@ def inspect(
     """Show what a record holds, and what is odd about it; of a file whose channels have no kinds, the channels."""
     check_outputs({"--report": report}, [source.record])
     if (found := source.listing(source.record)) is not None:
-        proposal = source.proposal("diagnose", found.proposed)
+        asked = None if out_units == "given" else shown_units(out_units)
+        found, proposal = found.in_units(asked), source.proposal("diagnose", found.proposed)
         if report is not None:
             with said_in_options():
                 found.report(report, proposal)
-        asked = shown_units(out_units)
         show_listing(found, proposal)
-        if asked is not None:
-            say("--out-units waits until channels are named: the numbers above are as they stand in the file")
+        if later := source.given_but("time", "rate", "run", "sheet"):
+            say(f"channels must be named for {', '.join(later)}; the numbers above are of all that the file holds")
         return
     record = source.read()
     units, inspection = shown_units(out_units, record), record.inspect()
@@ -315,14 +313,13 @@ def _judged_again(d: dict[str, Any], changed: list[str]) -> dict[str, Any]:
 
 
 @command
+@takes_record
 def demo(
-    data: Annotated[Path | None, option("Diagnose this file instead of the made-up record, as Silverbox.")] = None,
-    force: Annotated[str, typer.Option(help="Name of the force in --data.", rich_help_panel=CHANNELS)] = "u",
-    displacement: Annotated[
-        str, typer.Option(help="Name of the displacement in --data.", rich_help_panel=CHANNELS)
-    ] = "y",
-    unit: Units = None,
-    rate: Rate = None,
+    source: Channels,
+    data: Annotated[
+        Path | None,
+        option("Diagnose this file instead of the made-up record, as Silverbox: force u, displacement y if not named."),
+    ] = None,
     report: Annotated[Path, typer.Option(help="Where the page goes, as HTML.")] = Path("jfsm-demo.html"),
     key: Annotated[int, typer.Option(help="Seed of the made-up record and of the few random draws.", min=0)] = 0,
 ) -> None:
@@ -336,7 +333,8 @@ def demo(
         if data is None:
             shown = hidden_friction(key)
         else:
-            shown = measured(data, force=force, displacement=displacement, units=units(unit), rate=rate)
+            named = replace(source, force=source.force or ["u"], displacement=source.displacement or ["y"])
+            shown = measured(named.read_file(data, cut=True))
         typer.echo(shown.introduction + "\n")
         d = diagnose(shown.record, shown.model, holdout=shown.holdout, key=random_key(key), progress=tell)
     d.report(report)

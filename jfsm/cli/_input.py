@@ -162,6 +162,11 @@ class Channels:
         found = listing(path, time=self.time, rate=self.rate, run=self.run, sheet=self.sheet)
         return None if found.told else found
 
+    def given_but(self, *names: str) -> list[str]:
+        """The options that were given beside these, by their names alone."""
+        others = (field.name for field in fields(Channels) if field.name not in names)
+        return [f"--{_dashed(name)}" for name in others if getattr(self, name) not in (None, False)]
+
     def given(self) -> list[str]:
         """The options that were given, as they would be typed."""
         words = list[str]()
@@ -319,7 +324,7 @@ _IN_OPTIONS = (
     (r"`?\bat_rest=True`?", "--at-rest"),
     (r"\bPass (run|sheet)=(\d+)", r"Pass --\1 \2"),
     (r"\brecord\.resample\(rate\)", "--resample HZ"),
-    (r"\brecord\.resample\(([^)]*)\)", r"--resample \1"),
+    (r"\brecord\.resample\(([^)]*)\)", r"--resample \1, or --resample auto"),
     (r"(\b(?:jfsm|record)\.[a-z]+\([^)]*\))(?! in Python)", r"\1 in Python"),
     (r"`units`", "--unit"),
     (r"`causes`", "--cause"),

@@ -25,6 +25,7 @@ from ._observable import Place, require_apart, require_seen
 from ._part import Part, levers
 
 _SHORTEST = 32
+_COARSE, _FAR_BEYOND = 128, 3.0  # places at which the drift of integrated noise is reckoned; how many times of it
 _STRANGE = 5.0
 """Standard errors from which a spike is no part of the motion."""
 
@@ -171,7 +172,42 @@ def _untold(found: Motion, record: Record) -> tuple[str, ...]:
             f"shift that lasts, and motion slower than about {seconds:.2g} s, hardly show beside the noise of that "
             f"channel; the error bars do not hold them. Measure a displacement to know."
         )
+        beside = _beside(found, record, j, kind, n, noise)
+        if beside > 0:
+            notes.append(
+                f"Integrated, and freed of a curve of degree {n}, the {kind} of {j} goes up to {beside:.2g} "
+                f"{record.units['displacement']} away from the displacement that is given, far beyond its white noise: "
+                f"a shift that lasts, a slow motion, or a drift of the sensor, which this record does not tell apart."
+            )
     return tuple(notes)
+
+
+def _beside(found: Motion, record: Record, j: int, kind: str, n: int, noise: float) -> float:
+    """How far the integral of a channel goes from the estimate; 0 where white noise alone would take it there.
+
+    What integration leaves open, and a constant offset adds, is a polynomial of degree n and is taken off.
+    """
+    readings = record.responses[kind, j]
+    if kind == "acceleration" and record.base_acceleration is not None:
+        readings = readings - record.base_acceleration
+    if not np.all(np.isfinite(readings)):
+        return 0.0
+    path = readings
+    for _ in range(n):
+        path = record.dt * np.concatenate([[0.0], np.cumsum((path[1:] + path[:-1]) / 2)])
+    away = _without_curve(path - found.displacement[:, j - 1], n)
+    step = record.dt * len(record) / _COARSE
+    sums = np.linalg.matrix_power(np.tril(np.ones((_COARSE, _COARSE))), n)
+    spread = (
+        noise * np.sqrt(record.dt / step) * step**n * float(np.sqrt(np.sum(_without_curve(sums, n) ** 2) / _COARSE))
+    )
+    return float(np.max(np.abs(away))) if float(np.std(away)) > _FAR_BEYOND * spread else 0.0
+
+
+def _without_curve(values: np.ndarray, degree: int) -> np.ndarray:
+    """Columns of values less the polynomial that fits each best."""
+    basis, _ = np.linalg.qr(np.vander(np.linspace(-1, 1, values.shape[0]), degree + 1))
+    return values - basis @ (basis.T @ values)
 
 
 def _with_model(record: Record, model: Structure, places: Sequence[Place] | None) -> Motion:

@@ -3,16 +3,18 @@
 import contextlib
 import itertools
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from jfsm.records._out_units import OutUnits, out_units
 from jfsm.records._sources import opened
-from jfsm.records._units import KINDS, find_unit, seconds_in
+from jfsm.records._unit_words import dimension_and_size
+from jfsm.records._units import KINDS, coherent_unit, find_unit, seconds_in
 from jfsm.records.formats.base import Contents
 from jfsm.records.formats.clocks import clock_of
 from jfsm.records.formats.lookup import Choice, own_names
@@ -95,6 +97,19 @@ class Listing:
                 found[kind] = tuple(channel.name for channel in told or alike)
         return found
 
+    def in_units(self, asked: OutUnits) -> Self:
+        """The same with numbers in the units that are asked for, of channels whose unit is one of their quantities.
+
+        Raises
+        ------
+        ValueError
+            As of `out_units`.
+        """
+        from jfsm.reporting import in_shown_unit, shown_in
+
+        with shown_in(out_units(asked)):
+            return replace(self, channels=tuple(_in_unit(channel, in_shown_unit) for channel in self.channels))
+
     def report(self, path: str | Path, proposal: str = "") -> None:
         """Write a self-contained HTML page: the channels with a small picture each, and a command line to go on with.
 
@@ -108,6 +123,22 @@ class Listing:
         from jfsm.reporting import render_listing, write_text_atomically
 
         write_text_atomically(path, render_listing({**vars(self), "channels": map(vars, self.channels)}, proposal))
+
+
+def _in_unit(channel: ListedChannel, shown: Callable[[str], tuple[float, str]]) -> ListedChannel:
+    """A channel in the unit that is shown for its own, as it is where no other is."""
+    known = dimension_and_size(channel.unit)
+    coherent = None if known is None else coherent_unit(known[0])
+    if known is None or coherent is None:
+        return channel
+    size, word = shown(coherent)
+    if word == coherent:
+        return channel
+    factor = known[1] / size
+    outline = channel.outline * [1.0, factor]
+    return replace(
+        channel, unit=word, lowest=factor * channel.lowest, highest=factor * channel.highest, outline=outline
+    )
 
 
 def listing(

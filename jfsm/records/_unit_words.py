@@ -70,25 +70,35 @@ _LOWER: dict[str, Word] = {
     **dict.fromkeys(("h", "hr", "hour", "hours"), (_TIME, 3600.0)),
     **dict.fromkeys(("meter", "meters", "metre", "metres"), (_LENGTH, 1.0)),
     **dict.fromkeys(("micron", "microns"), (_LENGTH, 1e-6)),
-    **dict.fromkeys(("in", "inch", "inches", '"'), (_LENGTH, INCH)),
+    **dict.fromkeys(("in", "inch", "inches", "zoll", "pouce", "pouces", '"'), (_LENGTH, INCH)),
     **dict.fromkeys(("mil", "mils", "thou"), (_LENGTH, 1e-3 * INCH)),
     **dict.fromkeys(("ft", "foot", "feet"), (_LENGTH, FOOT)),
     **dict.fromkeys(("newton", "newtons"), (_FORCE, 1.0)),
-    **dict.fromkeys(("lb", "lbs", "lbf", "lbsf", "pound", "pounds"), (_FORCE, POUND)),
+    **dict.fromkeys(
+        ("lb", "lbs", "lbf", "lbsf", "pound", "pounds", "pound-force", "pounds-force", "poundforce"), (_FORCE, POUND)
+    ),
     **dict.fromkeys(("kip", "kips", "klb", "klbf"), (_FORCE, 1e3 * POUND)),
     **dict.fromkeys(("oz", "ozf"), (_FORCE, POUND / 16)),
-    **dict.fromkeys(("kgf", "kp"), (_FORCE, GRAVITY)),
+    **dict.fromkeys(("kgf", "kp", "kilopond"), (_FORCE, GRAVITY)),
     "gf": (_FORCE, 1e-3 * GRAVITY),
     **dict.fromkeys(("tf", "tonf"), (_FORCE, 1e3 * GRAVITY)),
-    "dyn": (_FORCE, 1e-5),
+    **dict.fromkeys(("dyn", "dyne", "dynes"), (_FORCE, 1e-5)),
     **dict.fromkeys(("radian", "radians"), (_ANGLE, 1.0)),
     **dict.fromkeys(("deg", "degs", "degree", "degrees", "°"), (_ANGLE, DEGREE)),
-    **dict.fromkeys(("rev", "revs", "revolution", "revolutions"), (_ANGLE, 360 * DEGREE)),
-    **dict.fromkeys(("rpm", "1/min"), (_TURN, 6 * DEGREE)),
+    **dict.fromkeys(("arcmin", "arcminute", "arcminutes"), (_ANGLE, DEGREE / 60)),
+    **dict.fromkeys(("arcsec", "arcsecond", "arcseconds"), (_ANGLE, DEGREE / 3600)),
+    **dict.fromkeys(("gon", "grad", "grads"), (_ANGLE, 0.9 * DEGREE)),
+    **dict.fromkeys(("rev", "revs", "revolution", "revolutions", "turn", "turns"), (_ANGLE, 360 * DEGREE)),
+    **dict.fromkeys(("rpm", "1/min", "min-1", "min^-1", "r/min", "u/min", "tr/min"), (_TURN, 6 * DEGREE)),
     "dps": (_TURN, DEGREE),
     "ips": (_SPEED, INCH),
     "fps": (_SPEED, FOOT),
-    **dict.fromkeys(("g's", "gs", "gee", "gees"), (_ACCELERATION, GRAVITY)),
+    **dict.fromkeys(("kph", "kmh"), (_SPEED, 1 / 3.6)),
+    "mph": (_SPEED, 5280 * FOOT / 3600),
+    **dict.fromkeys(("ms-1", "ms^-1"), (_SPEED, 1.0)),
+    **dict.fromkeys(("ms-2", "ms^-2"), (_ACCELERATION, 1.0)),  # as physicists write m s⁻²
+    **dict.fromkeys(("g's", "gs", "gee", "gees", "g_n", "g-force", "gforce"), (_ACCELERATION, GRAVITY)),
+    "%g": (_ACCELERATION, 1e-2 * GRAVITY),
     **dict.fromkeys(("gal", "gals"), (_ACCELERATION, 1e-2)),
     "mgal": (_ACCELERATION, 1e-5),
     **dict.fromkeys(("volt", "volts"), (_VOLTAGE, 1.0)),
@@ -103,6 +113,9 @@ _LOWER |= {
 }
 
 _SUPERSCRIPTS = str.maketrans({"⁰": "0", "¹": "1", "²": "2", "³": "3", "⁴": "4", "⁻": "-", "−": "-", "μ": "µ"})
+_MATHEMATICS = str.maketrans("", "", "${}\\")  # as in $m/s^{2}$
+_PLURAL = re.compile(r"(?<=[a-z])\(s\)$")  # newton(s)
+_SQUARED = re.compile(r"\s+squared\b", re.IGNORECASE)
 _FACTOR = re.compile(
     r"""(?P<sign>[*·⋅×.\s-]|/|per\b)?\s*
         (?P<word>[A-Za-zµ°]+(?:'s)?|")(?:\.(?![A-Za-zµ]))?
@@ -118,7 +131,8 @@ def dimension_and_size(text: str) -> Word | None:
 
     In what follows a slash everything divides, as recorders mean by ``m/s*s`` and by ``m/(s s)``.
     """
-    plain = text.translate(_SUPERSCRIPTS).strip()
+    plain = _PLURAL.sub("s", text.translate(_SUPERSCRIPTS).translate(_MATHEMATICS)).strip()
+    plain = _SQUARED.sub("^2", plain)
     if (known := _word(plain)) is not None:
         return known
     if grouped := _GROUPED.fullmatch(plain):
@@ -133,6 +147,8 @@ def dimension_and_size(text: str) -> Word | None:
             return None
         below = below or match["sign"] in ("/", "per")
         power = int(match["power"] or match["closed"] or 1) * (-1 if below else 1)
+        if not power:  # g0 is a name
+            return None
         dimension, size, place = dimension.times(word[0], power), size * word[1] ** power, match.end()
     return (dimension, size) if place else None
 

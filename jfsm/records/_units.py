@@ -68,13 +68,16 @@ _EXAMPLES = {
 }
 
 
+_ENCLOSED = re.compile(r"[\[(<{](.*)[\])>}]")
+
+
 def _find(text: str) -> Unit | None:
     """The unit that a text stands for, None if it is none that is known."""
     squeezed = text.strip("[] ").replace(" ", "").replace("^", "").replace("s2", "s²").lower()
     if squeezed in _NUMBERS:
         suffix = _NUMBERS[squeezed]
         return Unit("number" + suffix, 1.0, "1" + suffix)
-    found = dimension_and_size(text.strip().removeprefix("[").removesuffix("]"))
+    found = dimension_and_size(_ENCLOSED.sub(r"\1", text.strip()))
     if found is None or found[0] not in _BY_DIMENSION:
         return None
     quantity, coherent = _BY_DIMENSION[found[0]]

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from jfsm.records.formats.ardupilot import ArduPilotFormat
 from jfsm.records.formats.arrow import ArrowFormat
 from jfsm.records.formats.base import AbstractFormat
 from jfsm.records.formats.base import Contents as Contents
@@ -42,6 +43,7 @@ FORMATS: tuple[AbstractFormat, ...] = (
     ArrowFormat(),
     RosFormat(),
     UlogFormat(),
+    ArduPilotFormat(),
     C3dFormat(),
     ImcFormat(),
     CatmanFormat(),

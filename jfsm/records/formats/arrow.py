@@ -29,6 +29,8 @@ class ArrowFormat(AbstractFormat):
             try:
                 if is_parquet:
                     return parquet.read_schema(path) if names is None else parquet.read_table(path, columns=names)
+                if names is None:
+                    _walk(arrow, path)
                 table = feather.read_table(path, columns=names, memory_map=False)
                 return table.schema if names is None else table
             except (arrow.ArrowInvalid, OSError) as error:
@@ -61,3 +63,18 @@ class ArrowFormat(AbstractFormat):
         if "__index_level_0__" in original and headings.names:
             aliases["time"] = aliases.get("time", ("__index_level_0__",))
         return Contents(Lazy(original, column), headings.units, notes=tuple(notes), aliases=aliases)
+
+
+def _walk(arrow: Any, path: Path) -> None:
+    """Go through the batches one behind the other: what the end of the file says of their places may no longer hold.
+
+    Raises
+    ------
+    ArrowInvalid
+        If one does not begin where that before it ends.
+    """
+    with arrow.memory_map(str(path)) as source:
+        if source.read(6) == b"ARROW1":
+            source.seek(8)
+            for _ in arrow.ipc.open_stream(source):
+                pass

@@ -43,8 +43,7 @@ class C3dFormat(AbstractFormat):
                 f"{path.name} must be a C3D file; its header and parameters cannot be made out ({error}). Copy it "
                 f"again."
             ) from error
-        _require_whole(layout, path)
-        return _contents(path, parameters, layout)
+        return _contents(path, parameters, layout, _more(layout, path))
 
 
 class _Layout(NamedTuple):
@@ -93,13 +92,21 @@ def _layout(data: bytes, path: Path) -> _Layout:
     return layout
 
 
-def _require_whole(layout: _Layout, path: Path) -> None:
+def _more(layout: _Layout, path: Path) -> int:
+    """Bytes behind the frames, beyond the rest of the last block.
+
+    Raises
+    ------
+    ValueError
+        If the file ends before its frames do.
+    """
     size = os.path.getsize(path) - (layout.start - 1) * _BLOCK
     held = max(size, 0) // (layout.width * layout.number.itemsize)
     if held < layout.frames or layout.frames < 2:
         raise ValueError(
             f"{path.name} is cut short: it holds {held} of the {layout.frames} frames that it announces. Copy it again."
         )
+    return max(0, size - -(-layout.frames * layout.width * layout.number.itemsize // _BLOCK) * _BLOCK)
 
 
 def _parameters(data: bytes) -> Parameters:
@@ -137,7 +144,7 @@ def _values(data: bytes, place: int, order: str) -> list[Any]:
     return list(struct.unpack_from(f"{order}{count}{letter}", data, place)) if letter else []
 
 
-def _contents(path: Path, parameters: Parameters, layout: _Layout) -> Contents:
+def _contents(path: Path, parameters: Parameters, layout: _Layout, more: int) -> Contents:
     markers = {
         f"{label}.{letter}": (place, axis)
         for place, label in enumerate(_labels(parameters, "POINT", layout.markers))
@@ -166,7 +173,7 @@ def _contents(path: Path, parameters: Parameters, layout: _Layout) -> Contents:
         Lazy([*markers, *channels], array),
         {name: _SPELT.get(unit, unit) for name, unit in units.items() if unit},
         clocks=Lazy([*markers, *channels], clock),
-        notes=tuple(_notes(parameters, layout)),
+        notes=tuple(_notes(parameters, layout, more)),
     )
 
 
@@ -201,7 +208,9 @@ def _labels(parameters: Parameters, group: str, count: int) -> list[str]:
     return list(names)
 
 
-def _notes(parameters: Parameters, layout: _Layout) -> Iterator[str]:
+def _notes(parameters: Parameters, layout: _Layout, more: int) -> Iterator[str]:
+    if more:
+        yield f"The file goes on for {more} bytes behind its frames: if bytes came into it, numbers are wrong."
     if layout.first != 1:
         yield f"The clock reads zero at frame 1; the first frame of the file is number {layout.first}."
     zero = parameters.get(("FORCE_PLATFORM", "ZERO"), [])

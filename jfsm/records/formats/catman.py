@@ -69,7 +69,13 @@ class CatmanFormat(AbstractFormat):
             late = 0.0 if begins is None or name not in begun else float((begun[name] - begins).astype(np.int64)) * 1e-6
             return late + clocks[name].seconds(path)
 
-        notes = (*left_out(left), *dict.fromkeys(one.note for one in clocks.values() if one.note))
+        behind = path.stat().st_size - max(channel.start + channel.size for channel in channels)
+        more = [f"The file goes on for {behind} bytes behind its samples: if bytes came into it, numbers are wrong."]
+        notes = (
+            *left_out(left),
+            *(more if behind else []),
+            *dict.fromkeys(one.note for one in clocks.values() if one.note),
+        )
         return Contents(
             Lazy(names, lambda name: _values(path, by_name[name])),
             {name: channel.unit for name, channel in by_name.items() if channel.unit},

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -10,30 +11,41 @@ from numpy.typing import NDArray
 from jfsm.records._units import find_unit
 from jfsm.records.formats.base import Contents
 from jfsm.records.formats.lookup import Choice, choose, listed, samples_of
-from jfsm.records.formats.stamps import Instants, instants_of_numbers, instants_of_texts, was_unwrapped
+from jfsm.records.formats.preambles import names_rate, rate_by_name
+from jfsm.records.formats.stamps import (
+    PACKED_DATE,
+    Instants,
+    instants_of_numbers,
+    instants_of_texts,
+    seconds_that_were_meant,
+    was_unwrapped,
+)
 from jfsm.records.formats.ticks import mended
 
 Seconds = NDArray[np.float64]
 
-RATE_NAMES = ("fs", "sample_rate", "samplerate", "sampling_rate", "sampling_frequency")  # Hz
-STEP_NAMES = ("dt", "ts", "delta_t", "sampling_interval")  # s
 DATE_NAMES = ("date", "datum", "fecha")
-_WORDS = "time|zeit|temps|tiempo|tempo|tid|tijd|uhrzeit"
+_WORDS = "time|zeit|temps|tiempo|tempo|tid|tijd|uhrzeit|laufzeit|čas|czas|время|时间|時間|elapsed|tout"
+_AHEAD = "running|elapsed|relative|test|total|rel|sample|sampling|sensor|system|measurement"
 _UNIT = "(?P<unit>s|sec|seconds|ms|us|µs|ns|min)"
 # In order: the name alone, then with what goes with it, then absolute times.
 _TIME_NAMES = tuple(
     re.compile(pattern, re.IGNORECASE)
     for pattern in (
         rf"%?(?:{_WORDS}|t)",
-        rf"(?:(?:running|elapsed|relative|test|total|rel)[ ._-]*)?(?:{_WORDS}|t)(?:[ ._-]*{_UNIT})?",
-        rf"millis|micros|x[ _-]?value|x[ _-]?axis|seconds|sekunden|abtastzeit|messzeit|(?:{_WORDS})\s+\d.*",
-        r"(?:date[ _/-]*time|time[ _-]*stamp|zeitstempel|datum[ _/-]*(?:zeit|uhrzeit)?|date)"
+        rf"(?:(?:{_AHEAD})[ ._-]*)?(?:(?:{_WORDS})(?:[ ._-]*{_UNIT})?|t[ ._-]+{_UNIT.replace('unit', 'unit_of_t')})",
+        r"millis|micros|x[ _-]?value|x[ _-]?axis|secs?|seconds(?:[ _-]elapsed)?|elapsed[ _-]seconds|sekunden"
+        rf"|abtastzeit|messzeit|(?:{_WORDS})(?:\s+\d.*|\[\d+\])",
+        r"(?:date[ _/-]*time|(?:rosbag[ _-]*)?time[ _-]*stamp|ts|zeitstempel|datum[ _/-]*(?:zeit|uhrzeit)?|date)"
         rf"(?:[ ._-]*{_UNIT})?",
     )
 )
 _FREQUENCY = re.compile(r"(?:freq|frequency|frequenz|fr[ée]quence)(?:[ _]*hz)?|hz", re.IGNORECASE)
 _COUNTS = {"millis": "ms", "micros": "us"}  # functions of Arduino, and the units of what they give
 _NS = 1_000_000_000
+LIKELY = 8  # arrays among which a clock without a name is looked for
+_WHOLE_WORD = re.compile(rf"(?:^|[^a-z])(?:{_WORDS}|timestamp|clock)(?:$|[^a-z])", re.IGNORECASE)
+_SINCE = re.compile(r"(?P<unit>\S+) since (?P<date>\d{4}-\d{1,2}-\d{1,2}.*)")  # as netCDF states units of time
 AGREES = 0.005  # relative difference of two statements of one rate that is worth no word
 
 
@@ -125,16 +137,74 @@ class _Finder:
                 (stated, size),
                 lambda: Clock(_counted(contents, self._source, [choice], stated.hertz), (), contents.begins, (note,)),
             )
+        if choice is not None and (guessed := self._guessed(choice)) is not None:
+            return guessed
         over = next((name for name in contents.arrays if _FREQUENCY.fullmatch(name.strip())), None)
         if over is not None:
             raise ValueError(
                 f"{self._source} holds a spectrum over {over!r} and no instants; a record holds samples over time. "
                 f'Export the samples over time, or pass time="..." or rate=... [Hz] if it is none.'
             )
+        even = next((name for name in islice(contents.arrays, LIKELY) if self._is_ramp(name)), None)
+        hint = f" {even!r} grows evenly, and may be the clock." if even is not None else ""
+        if choice is not None and choice.column is None and self._has_instants(choice):
+            hint = (
+                f" The first column of {choice.array!r} grows evenly: ask for '{choice.array}[1]' if it holds instants."
+            )
         raise ValueError(
-            f"{self._source} must say when its samples were taken; it holds {listed(contents.arrays)}. "
+            f"{self._source} must say when its samples were taken; it holds {listed(contents.arrays)}.{hint} "
             f'Pass time="..." or rate=... [Hz].'
         )
+
+    def _guessed(self, choice: Choice) -> Clock | None:
+        """What may be the clock, with a note: the first column of the channel's matrix, the only array that grows and
+        has a word for time in its name, the only rate in the file.
+        """
+        contents = self._contents
+        if (instants := self._first_column(choice)) is not None:
+            return instants
+        called = [
+            name
+            for name in contents.arrays
+            if name != choice.array and _WHOLE_WORD.search(name) and self._is_ramp(name, evenly=False)
+        ]
+        if len(called) == 1:
+            column = choose(contents, self._source, "time", called[0])
+            clock = self._once(called[0], lambda: _of_column(contents, self._source, column, self._units))
+            return clock._replace(notes=(f"{called[0]!r} is taken for the clock.", *clock.notes))
+        if choice.column is None and self._has_instants(choice):
+            return None
+        stated = ((name, _stated_by(contents, name)) for name in contents.arrays)
+        rates = [(name, rate) for name, rate in stated if rate is not None]
+        if len(rates) != 1:
+            return None
+        name, rate = rates[0]
+        size = samples_of(contents, self._source, choice).shape[0]
+        note = f"Counted by the only rate that the file states: {name!r}, {rate:.9g} Hz."
+        return self._once(
+            ("only", size), lambda: Clock(_counted(contents, self._source, [choice], rate), (), None, (note,))
+        )
+
+    def _is_ramp(self, name: str, *, evenly: bool = True) -> bool:
+        """Whether an array grows from sample to sample, by equal steps if that is asked for."""
+        try:
+            return _grows(np.asarray(self._contents.arrays[name]), evenly)
+        except ValueError:  # text
+            return False
+
+    def _has_instants(self, choice: Choice) -> bool:
+        is_matrix = samples_of(self._contents, self._source, choice).ndim == 2
+        return is_matrix and self._first_column(choice._replace(column=1)) is not None
+
+    def _first_column(self, choice: Choice) -> Clock | None:
+        """The first column of the matrix of a channel, as Simulink saves arrays with time, if it grows evenly."""
+        if not choice.column:
+            return None
+        instants = samples_of(self._contents, self._source, choice._replace(column=0, sign=1.0))
+        note = f"The first column of {choice.array!r} grows evenly and is taken for the instants, in seconds."
+        if not _grows(instants, evenly=True):
+            return None
+        return self._once(("matrix", choice.array), lambda: Clock(instants.astype(np.float64), (), None, (note,)))
 
     def of_rows(self, choice: Choice) -> Clock:
         """The clock of a channel over the rows of a table in which it has readings, if others have more of them."""
@@ -189,7 +259,8 @@ class _Finder:
         inside = [
             name
             for name in self._contents.arrays
-            if name.startswith(around) and not re.search(r"[./]", name[len(around) :])
+            if name.startswith(around)
+            and (name in self._contents.texts or not re.search(r"[./]", name[len(around) :]))  # tables have no groups
             if choice is None or name != choice.array
         ]
         ranked = [
@@ -218,6 +289,16 @@ class _Finder:
             return np.size(self._contents.arrays[name]) > 1
         except ValueError:  # text, such as dates
             return True
+
+
+def _grows(values: NDArray, evenly: bool) -> bool:
+    """Whether numbers grow from one to the next; evenly by steps that are alike and do not number rows."""
+    if values.ndim != 1 or values.size < 3 or values.dtype.kind not in "iuf":
+        return False
+    steps = np.diff(values.astype(np.float64))
+    if not evenly or not np.all(steps > 0):
+        return bool(np.all(steps > 0))
+    return not bool(np.all(steps == 1.0)) and float(np.ptp(steps)) <= 1e-3 * float(steps.mean())
 
 
 def _own_rows(samples: NDArray) -> NDArray[np.int64] | None:
@@ -255,15 +336,31 @@ def _rank(words: Iterable[str]) -> int | None:
 def _of_column(contents: Contents, source: str, column: Choice, units: Mapping[str, str]) -> Clock:
     unit = _unit(contents, source, column, units)
     if unit is None:
-        match = next((m for p in _TIME_NAMES if (m := p.fullmatch(column.array.rpartition("/")[2].strip()))), None)
-        unit = match.groupdict().get("unit") if match else None
-        unit = unit or _COUNTS.get(column.array.lower())
-    factor = _seconds(unit) if unit else None
+        unit = _unit_in_name(column.array)
+    since = _SINCE.fullmatch(unit or "")
+    factor = _seconds(since["unit"] if since else unit) if unit else None
     instants = _instants(contents, source, column, factor)
+    if since and instants.begins is None:
+        dated = instants_of_texts(np.array(2 * [since["date"] if ":" in since["date"] else f"{since['date']} 00:00"]))
+        instants = instants._replace(begins=dated.begins if dated else None)
     seconds, notes = mended(instants.seconds)
+    if factor is not None and instants.begins is None and seconds.size > 2:
+        step = float(np.median(np.diff(seconds[:1000])))
+        if words := seconds_that_were_meant(float(seconds[0]) / factor, step / factor, factor):
+            notes.append(
+                f"Warning: {column.array!r} is read in {unit}, as stated; its numbers look like {words}. Say so by "
+                f"units={{{column.name!r}: ...}} if they are."
+            )
     if unit is None and instants.begins is None and not instants.notes and not contents.about:
         notes.append(f"The unit of time is not stated; {column.array!r} is taken to be in seconds.")
     return Clock(seconds, (column,), instants.begins, (*instants.notes, *notes))
+
+
+def _unit_in_name(name: str) -> str | None:
+    """The unit of time that a name ends in, as ``time_ms``, or stands for, as ``micros``."""
+    match = next((m for p in _TIME_NAMES if (m := p.fullmatch(name.rpartition("/")[2].strip()))), None)
+    groups = match.groupdict() if match else {}
+    return groups.get("unit") or groups.get("unit_of_t") or _COUNTS.get(name.lower())
 
 
 def _instants(contents: Contents, source: str, column: Choice, factor: float | None) -> Instants:
@@ -283,6 +380,11 @@ def _instants(contents: Contents, source: str, column: Choice, factor: float | N
         return found
     if values.dtype.kind not in "iufmM":
         return Instants(values, None, ())
+    if factor is None and values.dtype.kind == "f" and values.size and 1.9e13 < values[0] < 2.2e13:
+        texts = contents.texts.get(column.array)
+        if texts is not None and all(map(PACKED_DATE.fullmatch, texts[:2])):
+            if (found := instants_of_texts(texts)) is not None:
+                return found
     found = instants_of_numbers(values, factor, lambda: _integers(contents, column, values))
     if values.dtype.kind in "iuf" and values.size > 1 and found.begins is None:
         if was_unwrapped(np.asarray(values, dtype=np.float64)):
@@ -306,7 +408,7 @@ def _unit(contents: Contents, source: str, column: Choice, units: Mapping[str, s
             find_unit(units[key], "time")
             return units[key]
     stated = contents.units.get(column.array)
-    if stated is not None and _seconds(stated) is None:
+    if stated is not None and _seconds(stated) is None and not _SINCE.fullmatch(stated):
         raise ValueError(
             f"{source} must state a unit of time for {column.array!r}; it states {stated!r}. Say which is meant by "
             f"units={{{column.array!r}: ...}}, or read the channel as what it is."
@@ -323,15 +425,18 @@ def _seconds(unit: str) -> float | None:
 
 def _number(contents: Contents, around: str) -> float | None:
     """The rate that a single number gives in one group or struct."""
-    lower = {name.lower(): name for name in reversed(list(contents.arrays))}
-    for names, inverse in ((RATE_NAMES, False), (STEP_NAMES, True)):
-        for name in names:
-            key = lower.get((around + name).lower())
-            if key is not None and np.size(contents.arrays[key]) == 1:
-                value = float(np.asarray(contents.arrays[key]).item())
-                if value > 0:
-                    return 1.0 / value if inverse else value
-    return None
+    inside = (
+        name for name in contents.arrays if name.startswith(around) and not re.search(r"[./]", name[len(around) :])
+    )
+    return next((rate for name in inside if (rate := _stated_by(contents, name)) is not None), None)
+
+
+def _stated_by(contents: Contents, name: str) -> float | None:
+    """The rate that an array gives by its name, if it is one number."""
+    if not names_rate(name):
+        return None
+    given = np.asarray(contents.arrays[name])
+    return rate_by_name(name, float(given.item())) if given.size == 1 and given.dtype.kind in "iuf" else None
 
 
 def _counted(contents: Contents, source: str, chosen: Sequence[Choice], rate: float) -> Seconds:

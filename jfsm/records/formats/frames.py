@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from jfsm.records.formats.base import Contents, Lazy
 from jfsm.records.formats.headings import are_units, headings_of
+from jfsm.records.formats.numbers import decimal_mark, is_gap, is_number, number
 
 CLOCK = "time"  # what an index or a coordinate that holds instants is called if it has no name
 
@@ -159,7 +160,13 @@ def _of_arrow(table: Any) -> Contents:
 def _contents(table: _Table) -> Contents:
     headings = headings_of(table.headings, len(table.headings[0]))
     places = {name: place for place, name in enumerate(headings.names)}
-    numbers, texts, neither = _sorted(places, table.column)
+    _, texts, neither = _sorted(places, table.column)
+    first = {name: str(table.column(places[name])[0]).strip() for name in texts}
+    of_numbers = [name for name in texts if _are_numbers(table.column(places[name])[1:])]
+    below = bool(of_numbers) and are_units([first[name] for name in of_numbers])  # a row of units under the headings
+    as_text = [name for name in of_numbers if below or is_number(first[name])]
+    texts = [name for name in texts if name not in as_text]
+    rows = slice(1, None) if below else slice(None)
     aliases = dict(headings.aliases)
     for name in (name for name, place in places.items() if place in table.instants and name != CLOCK):
         aliases[CLOCK] = (name,) if CLOCK not in places else aliases.get(CLOCK, ())
@@ -170,19 +177,41 @@ def _contents(table: _Table) -> Contents:
         if text in table.units
     }
 
+    if below:
+        stated = {**{name: first[name].strip("[](){}<> ") for name in as_text if first[name]}, **stated}
+
     def column(name: str) -> NDArray[Any]:
         if name in texts:
             raise ValueError(f"The column {name!r} must hold numbers to be a channel; it holds text. Name another.")
-        return table.column(places[name])
+        values = table.column(places[name])[rows]
+        return _read(values, name) if name in as_text else values
 
     left_out = (f"Neither numbers nor text, and left out: {', '.join(neither[:6])}.",) if neither else ()
+    converted = f"Numbers are kept as text in {', '.join(map(repr, as_text))}; they are read as numbers."
     return Contents(
-        Lazy([name for name in places if name in numbers or name in texts], column),
+        Lazy([name for name in places if name not in neither], column),
         {**headings.units, **stated},
-        notes=(*table.notes, *left_out, *headings.notes),
-        texts=Lazy(texts, lambda name: table.column(places[name]).astype(str)),
+        notes=(*table.notes, *left_out, *headings.notes, *([converted] if as_text else [])),
+        texts=Lazy(texts, lambda name: table.column(places[name])[rows].astype(str)),
         aliases=aliases,
     )
+
+
+def _are_numbers(values: NDArray[Any]) -> bool:
+    """Whether texts are numbers, as far as the first hundred tell."""
+    return values.size > 0 and all(is_number(str(value)) or is_gap(str(value)) for value in values[:100])
+
+
+def _read(values: NDArray[Any], name: str) -> NDArray[np.float64]:
+    """The numbers that the texts of a column stand for."""
+    fields = [str(value) for value in values]
+    mark = decimal_mark(fields, ".")
+    try:
+        return np.array([number(field, mark) for field in fields])
+    except ValueError as error:
+        raise ValueError(
+            f"The column {name!r} must hold numbers to be a channel; {error}. Mend it, or name another."
+        ) from error
 
 
 def _sorted(places: Mapping[str, int], column: Callable[[int], NDArray[Any]]) -> tuple[list[str], list[str], list[str]]:

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from jfsm.records.formats.base import ABOUT, AbstractFormat, Contents, Lazy, left_out
-from jfsm.records.formats.hdf5_texts import numbers_of, text_of
+from jfsm.records.formats.hdf5_texts import numbers_of, text_of, texts_of
+from jfsm.records.formats.preambles import names_rate, rate_by_name, stated_rate
 
 if TYPE_CHECKING:
     import h5py
 
+_COLUMN_NAMES = ("columns", "column_names", "names", "channels", "channel_names", "labels", "headers", "fields")
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 NUMERIC = "iufcb"  # kinds of dtype that hold numbers
 
@@ -33,9 +35,16 @@ class Hdf5Format(AbstractFormat):
         packed: dict[str, _Packing] = {}
         notes: list[str] = []
         skipped: list[str] = []
+        rates: dict[str, tuple[float, int]] = {}  # of a dataset, and its number of samples
+        numbers: dict[str, float] = {}  # rates and steps of groups
+        columns: dict[str, tuple[str, int]] = {}  # of matrices with names for them
 
         def visit(name: str, item: Any) -> None:
-            if not hasattr(item, "dtype") or item.shape is None:
+            if not hasattr(item, "dtype"):
+                numbers.update({f"{name}/{key}": value for key, value in _rates(item)})
+                skipped.extend(f"{name}/{other}" for other in _links(item))
+                return
+            if item.shape is None:
                 return
             if not isinstance(name, str) or item.external:  # a name that is no text comes as bytes
                 skipped.append(f"{name} (stored outside the file)" if isinstance(name, str) else repr(name))
@@ -43,6 +52,13 @@ class Hdf5Format(AbstractFormat):
             places.update(_places(name, item))
             if unit := text_of(item, "units") or text_of(item, "unit"):
                 units[name] = unit
+            for key, value in _rates(item):
+                if rate := rate_by_name(key, value):
+                    rates[name] = (rate, max(item.shape, default=0))
+            for place, (column, of_unit) in enumerate(_columns(item)):
+                columns[f"{name}.{column}"] = (name, place)
+                if of_unit:
+                    units[f"{name}.{column}"] = of_unit
             if item.dtype.kind not in NUMERIC and not item.dtype.names:
                 skipped.append(name)
             if packing := _packing(item):
@@ -51,9 +67,17 @@ class Hdf5Format(AbstractFormat):
 
         with opened(path, f"{path.name} must be an HDF5 file") as file:
             file.visititems(visit)
+            numbers.update(_rates(file))
+            skipped.extend(_links(file))
+            if longer := longer_than_stated(file, path):
+                notes.append(longer)
             about = json.loads(text_of(file, ABOUT)) if ABOUT in file.attrs else {}
 
         def array(name: str) -> np.ndarray:
+            if name in numbers:
+                return np.array(numbers[name])
+            if name in columns:
+                return array(columns[name][0])[:, columns[name][1]]
             place, column = places[name]
             with opened(path, f"{path.name} must be an HDF5 file") as file:
                 values = dataset(file, place)
@@ -61,7 +85,16 @@ class Hdf5Format(AbstractFormat):
                 return packed[place].unpacked(values)
             return values if column is None else values[column]
 
-        return Contents(Lazy(places, array), units, about, notes=(*notes, *left_out(skipped)))
+        for group, rate in _common({name: rate for name, (rate, _) in rates.items()}).items():
+            numbers.setdefault(f"{group}fs", rate)  # where instants lie beside the samples, these count
+            rates = {name: given for name, given in rates.items() if name.rpartition("/")[0] != group.rstrip("/")}
+        return Contents(
+            Lazy([*places, *(name for name in columns if name not in places), *numbers], array),
+            units,
+            about,
+            clocks=Lazy(rates, lambda name: np.arange(rates[name][1]) / rates[name][0]),
+            notes=(*notes, *left_out(skipped)),
+        )
 
     def save(self, path: Path, contents: Contents) -> None:
         import h5py
@@ -77,6 +110,56 @@ def _places(name: str, item: Any) -> dict[str, tuple[str, str | None]]:
     """What a dataset holds of numbers: itself, or the fields of a table; by name the dataset and the field."""
     fields = {f"{name}.{field}": (name, field) for field in item.dtype.names or () if item.dtype[field].kind in NUMERIC}
     return {name: (name, None), **fields} if item.dtype.kind in NUMERIC else fields
+
+
+def _links(group: Any) -> list[str]:
+    """What a group names that lies in another file."""
+    import h5py
+
+    links = ((name, group.get(name, getlink=True)) for name in group if isinstance(name, str))
+    return [f"{name} (a link to another file)" for name, link in links if isinstance(link, h5py.ExternalLink)]
+
+
+def _rates(item: Any) -> Iterator[tuple[str, float]]:
+    """Attributes that give a sampling rate or step, as a number or as a text that begins with one."""
+    for key in (key for key in item.attrs if isinstance(key, str) and names_rate(key)):
+        numbers = numbers_of(item, key)
+        if numbers.size == 1:
+            yield key, float(numbers[0])
+        elif (text := text_of(item, key)) and (stated := stated_rate([f"rate: {text}"])):
+            yield "fs", stated.hertz
+
+
+def _common(rates: dict[str, float]) -> dict[str, float]:
+    """The rate of each group, ``run/``, whose datasets all have one."""
+    groups: dict[str, set[float]] = {}
+    for name, rate in rates.items():
+        groups.setdefault(name[: name.rfind("/") + 1], set()).add(rate)
+    return {group: min(of_group) for group, of_group in groups.items() if len(of_group) == 1}
+
+
+def _columns(item: Any) -> list[tuple[str, str]]:
+    """Names and units of the columns of a matrix, where attributes give as many as it has."""
+    if len(item.shape) != 2 or item.dtype.kind not in NUMERIC:
+        return []
+    lists = {key: texts_of(item, key) for key in (*_COLUMN_NAMES, "units", "unit")}
+    names = next((lists[key] for key in _COLUMN_NAMES if len(lists[key]) == item.shape[1]), [])
+    units = next((lists[key] for key in ("units", "unit") if len(lists[key]) == item.shape[1]), [""] * len(names))
+    return list(zip(names, units, strict=True)) if names else []
+
+
+def longer_than_stated(file: Any, path: Path) -> str:
+    """A sentence on bytes beyond the end that the file states; empty if there are none."""
+    with path.open("rb") as stream:
+        stream.seek(file.userblock_size)
+        head = stream.read(56)
+    version, wide = head[8], head[13] if head[8] < 2 else head[9]
+    end = {0: 24 + 2 * wide, 1: 28 + 2 * wide}.get(version, 12 + 2 * wide)
+    stated = int.from_bytes(head[end : end + wide], "little")
+    more = path.stat().st_size - stated
+    if more <= 0:
+        return ""
+    return f"The file is {more} bytes longer than it states: if bytes came into it, numbers behind them are wrong."
 
 
 class _Packing(NamedTuple):

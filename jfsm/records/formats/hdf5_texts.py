@@ -2,9 +2,12 @@
 
 A text of variable length lies in a heap of the file. In a heap that is damaged the library may run for ever, or end the
 process, so the reference of a text is looked up and its heap is walked before, after the public specification of the
-format. Attributes in dense storage, which newer files use for more than eight of an object, are read unchecked.
+format. Attributes in dense storage, which newer files use for more than eight of an object, are found by their names.
 """
 
+import functools
+import mmap
+import os
 import struct
 from collections.abc import Iterator
 from typing import Any, BinaryIO, NamedTuple
@@ -25,18 +28,31 @@ def text_of(item: Any, name: str) -> str:
     ValueError
         If it is damaged.
     """
+    found = texts_of(item, name)
+    return found[0] if len(found) == 1 else ""
+
+
+def texts_of(item: Any, name: str) -> list[str]:
+    """The texts of an attribute, one or several; none if it holds anything else.
+
+    Raises
+    ------
+    ValueError
+        If one is damaged.
+    """
     import h5py
 
     if name not in item.attrs:
-        return ""
+        return []
     attribute = h5py.h5a.open(item.id, name.encode())
     kind = attribute.get_type()
-    if kind.get_class() != h5py.h5t.STRING or attribute.get_space().get_simple_extent_npoints() != 1:
-        return ""
-    if kind.is_variable_str() and not _is_sound(item, name):
+    count = attribute.get_space().get_simple_extent_npoints()
+    if kind.get_class() != h5py.h5t.STRING or not 0 < count <= _MANY:
+        return []
+    if kind.is_variable_str() and not _is_sound(item, name, count):
         raise ValueError(f"the text {name!r} of {item.name!r} is damaged")
-    value = np.ravel(np.asarray(item.attrs[name]))[0]
-    return (value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)).strip()
+    values = np.ravel(np.asarray(item.attrs[name])).tolist()
+    return [(each.decode("utf-8", "replace") if isinstance(each, bytes) else str(each)).strip() for each in values]
 
 
 def numbers_of(item: Any, name: str) -> np.ndarray:
@@ -55,34 +71,64 @@ class _Message(NamedTuple):
     body: bytes
 
 
-def _is_sound(item: Any, name: str) -> bool:
-    """Whether the text lies where its reference says, in a heap that is whole, as far as that can be looked up."""
+def _is_sound(item: Any, name: str, count: int) -> bool:
+    """Whether texts lie where their references say, in heaps that are whole."""
     import h5py.h5o
 
-    base = item.file.userblock_size
+    base, path = item.file.userblock_size, item.file.filename
     try:
-        with open(item.file.filename, "rb") as stream:
-            reference = _reference(stream, base, h5py.h5o.get_info(item.id).addr, name.encode())
-            if reference is None:
-                return True
-            length, heap, index = struct.unpack("<IQI", reference)
-            return heap in _NOWHERE or length <= _sizes(stream, base + heap).get(index, -1)
+        with open(path, "rb") as stream:
+            references = _references(stream, base, h5py.h5o.get_info(item.id).addr, name.encode(), count)
+            if references is None:
+                stat = os.stat(path)
+                return _are_sound_anywhere(path, base, name.encode(), count, (stat.st_size, stat.st_mtime_ns))
+            return _are_sound(stream, base, references)
     except (struct.error, ValueError):
         return False
 
 
-def _reference(stream: BinaryIO, base: int, address: int, name: bytes) -> bytes | None:
-    """The sixteen bytes that stand for a text in the header of an object; None where they lie elsewhere."""
+def _are_sound(stream: BinaryIO, base: int, references: bytes) -> bool:
+    for length, heap, index in struct.iter_unpack("<IQI", references):
+        if heap not in _NOWHERE and length > _sizes(stream, base + heap).get(index, -1):
+            return False
+    return True
+
+
+def _references(stream: BinaryIO, base: int, address: int, name: bytes, count: int) -> bytes | None:
+    """The bytes that stand for texts in the header of an object, 16 for each; None where they lie elsewhere."""
     for message in _messages(stream, base, address):
-        if message.kind != _ATTRIBUTE or message.flags & _SHARED:
-            continue
-        version, _, *sizes = struct.unpack_from("<BBHHH", message.body)
-        place = 9 if version == 3 else 8
-        if message.body[place : place + sizes[0]].rstrip(b"\0") == name:
-            rounded = sizes if version != 1 else [(size + 7) // 8 * 8 for size in sizes]
-            place += sum(rounded)
-            return message.body[place : place + 16]
+        if message.kind == _ATTRIBUTE and not message.flags & _SHARED:
+            if (found := _referred(message.body, 0, name, count)) is not None:
+                return found
     return None
+
+
+def _referred(block: Any, start: int, name: bytes, count: int) -> bytes | None:
+    """The references in a message on an attribute that begins at a place; None if it is on none of this name."""
+    version, _, *sizes = struct.unpack_from("<BBHHH", block, start)
+    place = start + (9 if version == 3 else 8)
+    if block[place : place + sizes[0]].rstrip(b"\0") != name:
+        return None
+    rounded = sizes if version != 1 else [(size + 7) // 8 * 8 for size in sizes]
+    place += sum(rounded)
+    return block[place : place + 16 * count]
+
+
+@functools.lru_cache(maxsize=256)
+def _are_sound_anywhere(path: str, base: int, name: bytes, count: int, _: tuple[int, int]) -> bool:
+    """Whether the texts of all attributes of this name in dense storage are sound, of whatever objects they are.
+
+    What the last argument says of the file only keeps an answer from outliving it.
+    """
+    with open(path, "rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        at = content.find(name + b"\0")
+        while at >= 0:
+            if at >= 9 and content[at - 9] == 3 and struct.unpack_from("<H", content, at - 7) == (len(name) + 1,):
+                references = _referred(content, at - 9, name, count)
+                if references is not None and not _are_sound(stream, base, references):
+                    return False
+            at = content.find(name + b"\0", at + 1)
+    return True
 
 
 def _messages(stream: BinaryIO, base: int, address: int) -> Iterator[_Message]:

@@ -99,7 +99,7 @@ def _aliases(names: Sequence[str], texts: Sequence[str], bare: Sequence[str]) ->
 
 def split_unit(text: str) -> tuple[str, str]:
     """Name and unit of a heading, the unit empty where it has none: ``Force (kN)``, ``Time/s``, ``Weg, mm``."""
-    groups = list(_GROUP.finditer(text))
+    groups = [group for group in _GROUP.finditer(text) if not _inside(group).isdigit()]  # as in time[0]
     if groups:
         known = [group for group in groups if is_unit(_inside(group))]
         group = (known or groups)[-1]

@@ -64,6 +64,8 @@ def choose(contents: Contents, source: str, kind: str, name: str) -> Choice:
                 return Choice(kind, name, candidate, column, sign)
     close = difflib.get_close_matches(base, contents.arrays, n=1)
     hint = f" Did you mean {close[0]!r}?" if close else ""
+    skipped = next((note for note in contents.notes if re.search(rf"(?<!\w){re.escape(base)}(?!\w)", note)), None)
+    hint = f" {skipped}" if skipped is not None else hint
     raise ValueError(
         f"`{kind}` must name a channel of {source}, which holds {listed(contents.arrays)}; it was {name!r}.{hint}"
     )
@@ -75,6 +77,9 @@ def _meant(contents: Contents, text: str) -> tuple[str, ...]:
         return (text,)
     if text in contents.aliases:
         return contents.aliases[text]
+    text = re.sub(r"\((\d+)\)", r"{\1}", text) if "{1}" in "".join(contents.arrays) else text  # runs(2) of MATLAB
+    if text in contents.arrays:
+        return (text,)
     if text.isdigit() and 1 <= int(text) <= len(contents.arrays):
         return (list(contents.arrays)[int(text) - 1],)
     return tuple(name for name in contents.arrays if name.endswith((f"/{text}", f".{text}")))

@@ -12,6 +12,7 @@ from jfsm.records.formats import mat73
 from jfsm.records.formats.base import ABOUT, AbstractFormat, Contents, Lazy
 from jfsm.records.formats.hdf5 import NUMERIC
 from jfsm.records.formats.mat5 import require_sound
+from jfsm.records.formats.mat_texts import Column, described
 
 
 class MatFormat(AbstractFormat):
@@ -28,7 +29,8 @@ class MatFormat(AbstractFormat):
             require_sound(path)
             variables = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
         except NotImplementedError:  # of version 7.3
-            return _found(mat73.variables(path)).contents({}, path)
+            found, remark = mat73.variables(path)
+            return _found(found).contents({}, path, remark)
         except Exception as error:  # whatever the reader stumbles over in bytes that are no such file
             raise ValueError(
                 f"{path.name} must be a MATLAB file; it cannot be opened as one ({error}), and may be cut short. "
@@ -64,7 +66,8 @@ class _Found:
     """What lies below the variables of a file: numbers by dotted name, their labels and units, and what was skipped."""
 
     def __init__(self) -> None:
-        self._arrays: dict[str, np.ndarray | mat73.Late] = {}
+        self._arrays: dict[str, np.ndarray | mat73.Late | Column] = {}
+        self._texts: dict[str, list[str]] = {}
         self._units: dict[str, str] = {}
         self._labels: dict[str, list[str]] = {}
         self._skipped: list[str] = []
@@ -78,6 +81,8 @@ class _Found:
             self._describe(name, value)
             for field in value._fieldnames:
                 self.take(f"{name}.{field}", getattr(value, field))
+        elif texts := _texts(value):
+            self._texts[name] = texts
         elif isinstance(value, np.ndarray) and value.dtype.kind == "O":
             for place, item in enumerate(value.ravel(order="F"), start=1):
                 self.take(f"{name}{{{place}}}", item)
@@ -86,10 +91,10 @@ class _Found:
         elif isinstance(value, int | float | np.ndarray | np.number) and np.asarray(value).dtype.kind in NUMERIC:
             if np.size(value):
                 self._arrays[name] = np.asarray(value)
-        elif not isinstance(value, str) and not (isinstance(value, np.ndarray) and value.dtype.kind in "US"):
+        elif not isinstance(value, str) and not (isinstance(value, np.ndarray) and value.dtype.kind in "USO"):
             self._skipped.append(f"{name} ({_class_name(value)})")
 
-    def contents(self, remarks: dict[str, Any], path: Path) -> Contents:
+    def contents(self, remarks: dict[str, Any], path: Path, doubt: str = "") -> Contents:
         """The contents of the file.
 
         Raises
@@ -103,16 +108,27 @@ class _Found:
                 f"{path.name} must hold arrays or structs of numbers; {skipped}. Save the numbers in MATLAB, as "
                 f"s.time = x.Time; s.data = x.Data."
             )
-        units = {name: unit for name, unit in self._units.items() if name in self._arrays}
+        said = described(self._texts, {n: a for n, a in self._arrays.items() if not isinstance(a, Column)})
+        self._arrays |= {name: column for name, column in said.columns.items() if name not in self._arrays}
+        for name, label in said.labels.items():
+            self._labels.setdefault(label, []).append(name)
+        rates = {name: rate for name, rate in said.rates.items() if name in self._arrays and name not in self._clocks}
+        units = {n: unit for n, unit in {**said.units, **self._units}.items() if n in self._arrays}
         aliases = {text: tuple(n for n in names if n in self._arrays) for text, names in self._labels.items()}
         return Contents(
             Lazy(self._arrays, lambda name: np.asarray(self._arrays[name])),
             {**units, **remarks.pop("units", {})},
             remarks,
-            clocks={name: clock for name, clock in self._clocks.items() if name in self._arrays},
-            notes=(skipped + ".",) if skipped else (),
+            clocks=Lazy(
+                [name for name in (*self._clocks, *rates) if name in self._arrays],
+                lambda name: self._clocks[name] if name in self._clocks else self._counted(name, rates[name]),
+            ),
+            notes=tuple(filter(None, (skipped and skipped + ".", doubt))),
             aliases={text: names for text, names in aliases.items() if names and text not in self._arrays},
         )
+
+    def _counted(self, name: str, rate: float) -> np.ndarray:
+        return np.arange(np.shape(self._arrays[name])[0]) / rate
 
     def _take_testlab(self, name: str, signal: Any) -> None:
         """A signal as Simcenter Testlab writes it: samples, and an axis of start, step and number."""
@@ -153,6 +169,16 @@ def _found(variables: Mapping[str, Any]) -> _Found:
         if not name.startswith("__"):
             found.take(name, value)
     return found
+
+
+def _texts(value: Any) -> list[str]:
+    """A text, or the texts of a cell or of the rows of a matrix of letters; empty if it holds anything else."""
+    if isinstance(value, str):
+        return [value.strip()]
+    if not isinstance(value, np.ndarray) or value.dtype.kind not in "UO":
+        return []
+    items = value.ravel(order="F").tolist()
+    return [item.strip() for item in items] if items and all(isinstance(item, str) for item in items) else []
 
 
 def _text(struct: Any, *fields: str) -> str:

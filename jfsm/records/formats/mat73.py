@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from jfsm.records.formats.hdf5 import NUMERIC, dataset, opened
+from jfsm.records.formats.hdf5 import NUMERIC, dataset, longer_than_stated, opened
 from jfsm.records.formats.hdf5_texts import text_of
 
 
@@ -32,8 +32,9 @@ class Unread:
 class Late:
     """An array of numbers that is read when NumPy asks for it."""
 
-    def __init__(self, path: Path, demand: str, place: str):
-        self._path, self._demand, self._place = path, demand, place
+    def __init__(self, path: Path, demand: str, item: Any):
+        self._path, self._demand, self._place = path, demand, item.name
+        self.shape = tuple(size for size in reversed(item.shape) if size != 1)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         with opened(self._path, self._demand) as file:
@@ -41,8 +42,10 @@ class Late:
         return values if dtype is None else values.astype(dtype)
 
 
-def variables(path: Path) -> dict[str, Any]:
-    """The variables of a file by name: structs, object arrays of cells, texts, and arrays that are read later.
+def variables(path: Path) -> tuple[dict[str, Any], str]:
+    """The variables of a file by name, and a remark on its length, empty where that is as stated.
+
+    Variables are structs, object arrays of cells, texts, and arrays that are read later.
 
     Raises
     ------
@@ -51,7 +54,8 @@ def variables(path: Path) -> dict[str, Any]:
     """
     demand = f"{path.name} must be a MATLAB file"
     with opened(path, demand) as file:
-        return {name: _value(file[name], path, demand) for name in _inside(file) if not name.startswith("#")}
+        names = (name for name in _inside(file) if not name.startswith("#"))
+        return {name: _value(file[name], path, demand) for name in names}, longer_than_stated(file, path)
 
 
 def _inside(group: Any) -> list[str]:
@@ -77,7 +81,7 @@ def _value(item: Any, path: Path, demand: str) -> Any:
         return _cells([_value(item.file[one], path, demand) for one in _references(item)])
     if kind == "char" and item.dtype.kind in "ui":
         return "".join(map(chr, item[()].T.ravel(order="F").tolist()))
-    return Late(path, demand, item.name) if item.dtype.kind in NUMERIC else Unread(kind or str(item.dtype))
+    return Late(path, demand, item) if item.dtype.kind in NUMERIC else Unread(kind or str(item.dtype))
 
 
 def _struct(fields: Mapping[str, Any], file: Any, path: Path, demand: str) -> Any:

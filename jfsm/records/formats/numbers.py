@@ -23,6 +23,11 @@ _SPACED = re.compile(r"[-+]?\d{1,3}(?:[ ']\d{3})+([.,]\d*)?")
 _FRACTION = re.compile(r"[-+]?\d*,\d*([eE][-+]?\d+)?")
 
 
+_SUMMARY = re.compile(
+    r"(min|max|mean|average|avg|std|stdev|rms|sum|median|range|count|minimum|maximum|mittelwert|summe|end|eof)\b", re.I
+)
+
+
 def number(field: str, mark: Mark = ".") -> float:
     """The number a field stands for, NaN where it says that there is none.
 
@@ -97,3 +102,8 @@ def decimal_mark(fields: Iterable[str], by_default: Mark) -> Mark:
         elif point >= 0 and _PLAIN.fullmatch(text) and not _GROUPED[","].fullmatch(text):
             return "."
     return by_default
+
+
+def is_summary(field: str) -> bool:
+    """Whether a field begins a row that sums up those above it, or marks the end of a file."""
+    return _SUMMARY.match(field.strip()) is not None

@@ -12,7 +12,7 @@ import numpy as np
 from jfsm.records._runs_of import runs_of
 from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, optional_package
 from jfsm.records.formats.headings import headings_of
-from jfsm.records.formats.numbers import decimal_mark, is_gap, is_number, number
+from jfsm.records.formats.numbers import decimal_mark, is_gap, is_number, is_summary, number
 from jfsm.records.formats.preambles import stated_rate
 
 SHORTEST = 2  # rows of a table
@@ -141,7 +141,9 @@ def _is_value(cell: Any) -> bool:
 
 
 def _is_heading(row: Row) -> bool:
-    """Whether words outnumber the numbers of a row, as in ``Rate, 200, Hz``."""
+    """Whether words outnumber the numbers of a row, as in ``Rate, 200, Hz``, or it sums up others, as ``Mean, 3.2``."""
+    if any(isinstance(cell, str) and is_summary(cell) for cell in row[:1]):
+        return True
     words = sum(isinstance(cell, str) and not is_gap(cell) and not is_number(cell) for cell in row)
     return words > sum(map(_is_value, row))
 

@@ -11,7 +11,7 @@ Seconds = NDArray[np.float64]
 
 DAY = 86_400
 _NS = 1_000_000_000
-_EXCEL_ZERO, _LABVIEW_ZERO = np.datetime64("1899-12-30", "ns"), np.datetime64("1904-01-01", "ns")
+_LABVIEW_ZERO = np.datetime64("1904-01-01", "ns")
 _POSIX_ZERO, _WINDOWS_ZERO = np.datetime64("1970-01-01", "ns"), np.datetime64("1601-01-01", "us")
 
 _DATE = re.compile(
@@ -20,10 +20,28 @@ _DATE = re.compile(
     re.VERBOSE,
 )
 _CLOCK = re.compile(
-    r"""(?P<h>\d{1,2}):(?P<min>\d{2})(?::(?P<s>\d{2})(?:[.,:](?P<f>\d{1,9})\d*)?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?
+    r"""(?<![\d:])(?P<h>\d{1,3}):(?P<min>\d{2,3})(?::(?P<s>\d{2})(?:[.,:](?P<f>\d{1,9})\d*)?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?
         \s*(?P<zone>Z|UTC|[+-]\d{2}:?\d{2})?""",
     re.VERBOSE,
 )
+
+
+_MONTHS = {
+    month: place
+    for place, months in enumerate(
+        "jan janv|feb fév fev|mar mär mrz mars|apr avr|may mai|jun juin|jul juil|aug août aou|sep sept|oct okt|nov"
+        "|dec déc dez".split("|"),
+        start=1,
+    )
+    for month in months.split()
+}
+_NAMED = re.compile(
+    r"(?P<day>\d{1,2})[-. /](?P<month>[^\W\d_]{3,9})\.?[-. /](?P<year>\d{4})"
+    r"|(?P<month_first>[^\W\d_]{3,9})\.? (?P<day_second>\d{1,2}),? (?P<year_last>\d{4})"
+)
+_PACKED = re.compile(r"^\s*(\d{4})(\d{2})(\d{2})[T_ -]?(\d{2})(\d{2})(\d{2})(?=[.,Z+-]|\s*$)")
+_DOTTED = re.compile(r"^(\s*\d{4}-\d{2}-\d{2})[T_ -](\d{2})\.(\d{2})\.(\d{2})(?=[.,Z+-]|\s*$)")
+_MINUTES = re.compile(r"^\s*(\d{1,3}):(\d{2})(?=[.,]\d+\s*$)")
 
 
 class Instants(NamedTuple):
@@ -54,6 +72,23 @@ _EPOCHS = (
 )
 
 
+class _Days(NamedTuple):
+    """A count of days: how large it is nowadays, what it is on 1970-01-01, and who counts so."""
+
+    low: float
+    high: float
+    posix: int
+    words: str
+
+
+_DAY_COUNTS = (
+    _Days(2e4, 8e4, 25_569, "days since 1900, as Excel counts them"),
+    _Days(6.9e5, 7.9e5, 719_529, "days since the year 0, as MATLAB counts them"),
+)
+PACKED_DATE = re.compile(r"\s*(?:19|20|21)\d{12}(?:[.,]\d+)?\s*")
+"""A date and time in fourteen digits, which reads like a number."""
+
+
 def instants_of_numbers(values: NDArray[Any], factor: float | None, exact: Callable[[], NDArray[Any]]) -> Instants:
     """Instants of a column of numbers.
 
@@ -75,10 +110,11 @@ def instants_of_numbers(values: NDArray[Any], factor: float | None, exact: Calla
     if finite.size < 2:
         return Instants(numbers, None, ())
     level, step = float(finite[0]), float(np.median(np.abs(np.diff(finite))))
-    if factor is None and 2e4 < level < 8e4 and 0 < step < 1.2e-5:
-        seconds = (numbers - np.floor(level)) * DAY
-        zero = _EXCEL_ZERO + np.timedelta64(int(level) * DAY, "s")
-        return _from_first(seconds, zero, ("The column of time holds days since 1900, as Excel counts them.",))
+    for days in _DAY_COUNTS:
+        if factor is None and days.low < level < days.high and 0 < step < 1.2e-5:
+            seconds = (numbers - np.floor(level)) * DAY
+            zero = _POSIX_ZERO + np.timedelta64((int(level) - days.posix) * DAY, "s")
+            return _from_first(seconds, zero, (f"The column of time holds {days.words}.",))
     for epoch in _EPOCHS:
         fits = factor is None or np.isclose(factor * epoch.per_second, 1.0)
         if epoch.low < level < epoch.high and fits and (factor is not None or _is_likely(epoch, step)):
@@ -104,6 +140,8 @@ def instants_of_texts(texts: NDArray[Any], dates: NDArray[Any] | None = None) ->
     dates : (n,) array of str, optional
         The dates that go with times of day.
     """
+    texts = np.array([_usual(str(text)) for text in texts])
+    dates = None if dates is None else np.array([_usual(str(text)) for text in dates])
     clocks = [_CLOCK.search(text) for text in texts]
     if not len(texts) or any(clock is None for clock in clocks[:2]) or clocks.count(None):
         return None
@@ -135,6 +173,31 @@ def instants_of_texts(texts: NDArray[Any], dates: NDArray[Any] | None = None) ->
         )
         return Instants(seconds, result.begins, (*result.notes, note))
     return result
+
+
+def _usual(text: str) -> str:
+    """A date or time of day in the usual digits: of ``5-Mar-2024``, ``20240305T143000``, ``14.30.00``, ``01:59.5``."""
+    text = _PACKED.sub(r"\1-\2-\3 \4:\5:\6", text, count=1)
+    text = _DOTTED.sub(r"\1 \2:\3:\4", text, count=1)
+    text = _MINUTES.sub(r"0:\1:\2", text, count=1)
+    named = _NAMED.search(text)
+    if named is None:
+        return text
+    month, day, year = (
+        named[long] or named[short]
+        for long, short in (("month", "month_first"), ("day", "day_second"), ("year", "year_last"))
+    )
+    number = next(
+        (_MONTHS[word] for word in (month.lower(), month.lower()[:4], month.lower()[:3]) if word in _MONTHS), 0
+    )
+    return text.replace(named.group(), f"{year}-{number:02d}-{int(day):02d}") if number else text
+
+
+def seconds_that_were_meant(first: float, step: float, factor: float) -> str:
+    """What numbers count, where they are far beyond any date in the unit that is stated; empty where they are not."""
+    if first * factor < 1e10:
+        return ""
+    return next((epoch.words for epoch in _EPOCHS if epoch.low < first < epoch.high and _is_likely(epoch, step)), "")
 
 
 def _is_likely(epoch: _Epoch, step: float) -> bool:

@@ -14,13 +14,14 @@ _KNOWN: tuple[tuple[bytes, str, str], ...] = (
     (b"\x89PNG", "a picture", "Export the numbers as text."),
     (b"\xff\xd8\xff", "a picture", "Export the numbers as text."),
     (b"GIF8", "a picture", "Export the numbers as text."),
-    (b"\xa3\x95\x80", "an ArduPilot log", "Convert it: `mavlogdump.py --format csv --types IMU FILE > imu.csv`."),
     (b"H Product:Blackbox", "a Betaflight log", "Convert it: `blackbox_decode FILE` writes csv."),
     (b"DIAdem", "a DIAdem file", "Export it from DIAdem as TDMS or text."),
     (b"CDF\x01", "a netCDF 3 file", "Convert it to netCDF 4 (nccopy -k nc4)."),
     (b"CDF\x02", "a netCDF 3 file", "Convert it to netCDF 4 (nccopy -k nc4)."),
     (b"SQLite format 3", "an SQLite database", "Export the table as text."),
     (b"\x80\x04\x95", "a Python pickle, which could run anything", "Save the arrays by numpy.savez."),
+    (b"\x80\x05\x95", "a Python pickle, which could run anything", "Save the arrays by numpy.savez."),
+    (b"\x80\x03c", "a Python pickle, which could run anything", "Save the arrays by numpy.savez."),
 )
 
 

@@ -51,17 +51,19 @@ def _ramp(seconds: Seconds) -> tuple[Seconds | None, float]:
         return None, 0.0
     gaps = np.diff(levels)
     resolution = float(np.min(gaps[gaps > 1e-9 * levels[-1]], initial=levels[-1]))
-    kinds = np.unique(np.round(steps / resolution).astype(int))
-    if np.max(np.abs(steps / resolution - np.round(steps / resolution))) > 0.02 or np.ptp(kinds) > 1:
+    if np.max(np.abs(steps / resolution - np.round(steps / resolution))) > 0.02:
         return None, 0.0
-    index = np.arange(seconds.size)
-    slope, start = np.polyfit(index - index.mean(), seconds, 1)
-    ramp = start + slope * (index - index.mean())
-    error = seconds - ramp
-    if np.ptp(error) > resolution * (1 + 1e-6):
+    mean = float(steps.mean()) / resolution
+    if np.ptp(np.round(steps / resolution)) > 1 and abs(mean - round(mean)) < 0.02:  # stamps that were doubled
         return None, 0.0
-    # Digits that were rounded lie evenly about the true instants.
-    return ramp, resolution
+    index = np.arange(seconds.size) - 0.5 * (seconds.size - 1)
+    slope, start = np.polyfit(index, seconds, 1)
+    short = [step for d in (3, 2, 1) for step in (1 / float(f"{1 / slope:.{d}g}"), float(f"{slope:.{d}g}"))]
+    for step in (slope, *short):  # a rate or a step is a number of few digits
+        ramp = start + step * index
+        if np.ptp(seconds - ramp) <= resolution * (1 + 1e-6):
+            return ramp, resolution
+    return None, 0.0
 
 
 def _undoubled(seconds: Seconds) -> tuple[Seconds, NDArray[np.int64]]:

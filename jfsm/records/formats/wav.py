@@ -1,5 +1,6 @@
 """Sound files (WAV), as recorded by USB accelerometers, sound cards and analysers."""
 
+import struct
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,6 +11,7 @@ from scipy.io import wavfile
 
 from jfsm.records.formats.base import AbstractFormat, Contents, Lazy
 
+_FORMAT = {order: struct.Struct(f"{mark}HHIIHH") for order, mark in (("little", "<"), ("big", ">"))}
 FULL_SCALE = {"u1": 2.0**7, "i2": 2.0**15, "i4": 2.0**31, "i8": 2.0**63}  # SciPy shifts 24 bits to the top of 32
 
 
@@ -67,7 +69,7 @@ class WavFormat(AbstractFormat):
 
 
 def _of_strays(path: Path) -> Iterator[str]:
-    """What stands behind the last chunk of the file that can be one, as where the length of the samples is damaged."""
+    """What stands behind the last chunk that can be one, as where a length is damaged, and rates that differ."""
     whole = path.stat().st_size
     with path.open("rb") as stream:
         order: Literal["little", "big"] = "big" if stream.read(4) == b"RIFX" else "little"
@@ -75,6 +77,13 @@ def _of_strays(path: Path) -> Iterator[str]:
         while place + 8 <= whole:
             stream.seek(place)
             name, size = stream.read(4), int.from_bytes(stream.read(4), order)
+            if name == b"fmt " and size >= 16:
+                _, _, rate, bytes_a_second, bytes_a_sample, _ = _FORMAT[order].unpack(stream.read(16))
+                if bytes_a_second != rate * bytes_a_sample:
+                    yield (
+                        f"The file states {rate} samples of {bytes_a_sample} bytes a second and {bytes_a_second} bytes "
+                        f"a second, which do not go together; the first counts."
+                    )
             if not (name.isascii() and name.decode("ascii", "replace").isprintable()):
                 yield f"{whole - place} bytes from byte {place} on are no part of the sound; they are left out."
                 return

@@ -1,6 +1,7 @@
 """How the rows of a table of text are divided: told by a vote of rows from all over the file."""
 
 import csv
+import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -11,6 +12,7 @@ from jfsm.records.formats.text.lines import TextFile
 
 COMMENTS = ("#", "%", "//", "!")
 DELIMITERS = (";", "\t", ",", "|", None)  # None: any run of blanks. A semicolon first, for it goes with decimal commas
+_RULED = re.compile(r"[\s|+:]*[-=_]{3,}[-=_\s|+:]*")
 FIRST, PER_BLOCK, MOST = 1500, 40, 6000  # lines that vote: of the beginning, of every block, and at most
 MOSTLY = 0.6  # share of the fields of a column that makes it numeric
 
@@ -60,8 +62,8 @@ def fields_of(line: str, delimiter: str | None) -> list[str]:
 
 
 def is_comment(line: str) -> bool:
-    """Whether a line is a remark."""
-    return line.lstrip().startswith(COMMENTS)
+    """Whether a line is a remark, or a ruled line as under the heads of printed tables."""
+    return line.lstrip().startswith(COMMENTS) or _RULED.fullmatch(line) is not None
 
 
 def layout_of(file: TextFile) -> Layout:

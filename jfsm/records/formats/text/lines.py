@@ -14,6 +14,7 @@ def encoding_of(begins_with: bytes) -> str | None:
     """How a text is encoded that begins so; None if it is none. UTF-8 stands for all that only its end can tell."""
     for mark, encoding in (
         (codecs.BOM_UTF8, "utf-8-sig"),
+        (codecs.BOM_UTF32_LE, "utf-32"),  # begins as the mark of UTF-16 does
         (codecs.BOM_UTF16_LE, "utf-16"),
         (codecs.BOM_UTF16_BE, "utf-16"),
     ):

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,15 @@ from jfsm.records.formats.text.table import Segment, Table
 MARK = "# jfsm record "  # opens the line on which a written record keeps what is no column
 _LISTED = re.compile(
     r"^(?:units?(?: of)? )?(?P<name>.+?)(?:[ _]units?)?\s*[:=;\t]\s*[\[(]?(?P<unit>[^\s\])]+)[\])]?$", re.I
+)
+_LISTED_TOGETHER = re.compile(r"^units?\s*[:=]\s*(?P<pairs>[^=:]+[=:].+)$", re.I)
+_PAIR = re.compile(r"(?P<name>[^,;=:]+?)\s*[=:]\s*(?P<unit>[^,;]+?)\s*(?:[,;]|$)")
+_CALLED = re.compile(
+    r"^(?:channels?(?: names?)?|columns?(?: names?)?|names?|fields?|headers?|labels?|units?)\s*[:=]\s*", re.I
+)
+_NUMBERED = re.compile(
+    r"^(?:channel|column|col|ch|kanal|spalte|voie|canal)[ _.#]*(?P<number>\d+)(?: name)?\s*[:=;,\t]\s*(?P<text>.+)$",
+    re.I,
 )
 SHOWN = 3  # lines that a note quotes
 FEW = 2  # rows that a table at least has; fewer among more rows are a remark
@@ -95,12 +104,16 @@ class _Described:
             if is_comment(line) and not line.startswith(MARK)
         ]
         for lines in (plain, hidden):
-            above = [self._divided(line, width) for _, line in lines]
+            above = [self._divided(_CALLED.sub("", line), width) for _, line in lines]
             if segment.extra:  # the heading of a field that few rows have
                 above = [fields[:width] if len(fields) == width + 1 else fields for fields in above]
             headings = headings_of(above, width)
             if headings.used:
                 return headings, {lines[place][0]: lines[place][1] for place in headings.used}
+        numbered = {int(match["number"]): (at, match["text"]) for at, match in _matched(_NUMBERED, [*plain, *hidden])}
+        if set(numbered) == set(range(1, width + 1)):
+            headings = headings_of([[numbered[place][1].strip(' ";,') for place in sorted(numbered)]], width)
+            return headings, {at: text for at, text in numbered.values()}
         self._require_unambiguous(plain or hidden, width)
         return headings_of([], width), {}
 
@@ -108,12 +121,14 @@ class _Described:
         """Units in lines of their own, as ``# force: kN``; the lines are then understood."""
         found: dict[str, str] = {}
         for number, line in segment.above:
-            match = _LISTED.match(line.strip().lstrip("#%/! "))
-            if match is None or not is_unit(match["unit"]):
-                continue
-            meant = (match["name"],) if match["name"] in headings.names else headings.aliases.get(match["name"], ())
-            if len(meant) == 1 and number not in understood:
-                found[meant[0]], understood[number] = match["unit"], line
+            text = line.strip().lstrip("#%/! ")
+            together = _LISTED_TOGETHER.match(text)
+            matches = _PAIR.finditer(together["pairs"]) if together else filter(None, [_LISTED.match(text)])
+            for match in matches:
+                name, unit = match["name"].strip(" \"'{"), match["unit"].strip(" \"'}")
+                meant = (name,) if name in headings.names else headings.aliases.get(name, ())
+                if is_unit(unit) and len(meant) == 1 and (number not in understood or together):
+                    found[meant[0]], understood[number] = unit, line
         return found
 
     def _divided(self, line: str, width: int) -> list[str]:
@@ -171,17 +186,25 @@ class _Described:
         return notes
 
 
+def _matched(pattern: re.Pattern[str], lines: Sequence[Line]) -> Iterator[tuple[int, re.Match[str]]]:
+    """Lines that a pattern fits, remarks without their marks."""
+    for number, line in lines:
+        if match := pattern.match(line.strip().lstrip("#%/! ")):
+            yield number, match
+
+
 def _worthy(segments: Sequence[Segment]) -> tuple[list[Segment], list[str]]:
-    """Segments that are tables; single rows among them are said aloud."""
+    """Segments that are tables; single rows stand above the next one, or are said aloud."""
     kept = [segment for segment in segments if segment.count >= FEW]
-    notes = [
-        f"Line {segment.first} holds numbers but stands alone, and is left out."
-        for segment in segments
-        if segment.count < FEW and kept
-    ]
-    for before, after in zip(segments[:-1], segments[1:], strict=True):
-        if before.count < FEW and after.count >= FEW:
-            after.above = [*before.above, *after.above]
+    waiting, notes = list[Segment](), list[str]()
+    for segment in segments:
+        if segment.count < FEW:
+            waiting.append(segment)
+            continue
+        alone = [line for single in waiting for line in (*single.above, single.opening)]
+        segment.above, waiting = [*alone, *segment.above], []
+    if kept:
+        notes = [f"Line {single.first} holds numbers but stands alone, and is left out." for single in waiting]
     return kept, notes
 
 

@@ -1,17 +1,12 @@
 """The rows of a text as columns of doubles, and what stands between them."""
 
-import re
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from jfsm.records.formats.numbers import is_gap, is_number
+from jfsm.records.formats.numbers import is_gap, is_number, is_summary
 from jfsm.records.formats.text.layout import Layout, fields_of, is_comment, values_of
 from jfsm.records.formats.text.lines import Line, TextFile
-
-_SUMMARY = re.compile(
-    r"(min|max|mean|average|avg|std|stdev|rms|sum|median|range|count|minimum|maximum|mittelwert|summe|end|eof)\b", re.I
-)
 
 
 @dataclass
@@ -22,8 +17,10 @@ class Segment:
     ----------
     above : list of Line
         What stands above, without blank lines.
-    first, last : int
-        Lines between which the rows lie.
+    opening : Line
+        The first row.
+    last : int
+        The line of the last row.
     start, count : int
         Where they lie in the table, and how many they are.
     skipped : set of int
@@ -37,7 +34,7 @@ class Segment:
     """
 
     above: list[Line]
-    first: int
+    opening: Line
     start: int
     last: int = 0
     count: int = 0
@@ -46,6 +43,11 @@ class Segment:
     comments: list[Line] = field(default_factory=list)
     extra: list[Line] = field(default_factory=list)
     below: list[Line] = field(default_factory=list)
+
+    @property
+    def first(self) -> int:
+        """The line of the first row."""
+        return self.opening[0]
 
 
 class Table:
@@ -151,7 +153,7 @@ class Table:
             self._waiting.insert(0, self._broken)
             self._broken, begins = None, True
         if begins:
-            self.segments.append(Segment(self._waiting, number, self._rows))
+            self.segments.append(Segment(self._waiting, (number, line), self._rows))
         else:
             self.segments[-1].comments += self._waiting
             self.segments[-1].skipped |= {at for at, _ in self._waiting}
@@ -190,7 +192,7 @@ class Table:
     def _is_broken(self, fields: list[str]) -> bool:
         """Whether fields are rather a damaged row than a title or a summary."""
         numbers = sum(map(is_number, fields))
-        if _SUMMARY.match(fields[0]):
+        if is_summary(fields[0]):
             return False
         if len(fields) == self._layout.width:
             return bool(numbers) and not fields[0][:1].isalpha()
