@@ -47,7 +47,7 @@ class StandIn(NamedTuple):
         between = _BETWEEN.get(self.drive, "")
         return (
             "Of the simulation only its runs are known. A structure stands for it and follows them to "
-            f"{error} of the motion: {parts}.{between} Values and gains are those of this structure."
+            f"{error} of the motion: {parts}.{between} Values are those of this structure."
         )
 
 

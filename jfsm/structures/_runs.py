@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from ..records import Record
 from ._parameter import as_link
+from ._structure import Structure
 
 _MOTIONS = ("displacement", "velocity", "acceleration")
 _LAST = 0.9
@@ -36,15 +37,17 @@ class Runs:
         (n,) or (n, dof) arrays, or to ``{dof: (n,)}``, on the record's clock.
     places : links, optional
         Where it takes forces beside those of the record.
+    form : Structure, optional
+        Masses and links that it has.
     """
 
-    def __init__(self, run: Callable[..., Any], places: Iterable[tuple[int, int]] = ()):
+    def __init__(self, run: Callable[..., Any], places: Iterable[tuple[int, int]] = (), form: Structure | None = None):
         if not callable(run):
             raise TypeError(
                 "`run` must be a function of a record that gives the motion which the simulation makes of it; got "
                 f"{run!r}. The output of one run, as a record, goes into diagnose(record, simulated=...)."
             )
-        self._run, self.places = run, tuple(as_link(place) for place in places)
+        self._run, self.places, self.form = run, tuple(as_link(place) for place in places), form
 
     def __repr__(self) -> str:
         return f"Runs({getattr(self._run, '__name__', self._run)!s})"

@@ -126,7 +126,9 @@ class Simulation(Structure):
         return Simulation(own, dof, parameters, terms, sensors, trust)
 
     @staticmethod
-    def from_runs(run: Callable[..., Any], places: Iterable[tuple[int, int]] = ()) -> Runs:
+    def from_runs(
+        run: Callable[..., Any], places: Iterable[tuple[int, int]] = (), form: Structure | None = None
+    ) -> Runs:
         """A simulation that can only be run, for `diagnose`, which finds a structure that stands for it.
 
         Parameters
@@ -140,7 +142,11 @@ class Simulation(Structure):
             Where it takes forces beside those of the record. It is then called as ``run(record, extra)``, too: `extra`
             holds samples (n,) [N] by link, ``{(1, 2): samples}``, each force pushing the link's second end and pulling
             its first; (0, j) is a force on degree of freedom j. What is found is then run in the simulation itself, if
-            it lies at these places and a run shows the displacement of every degree of freedom, measured or not.
+            it lies at these places, or where a force of the record acts, and a run shows the displacement of every
+            degree of freedom, measured or not.
+        form : Structure, optional
+            Masses and links that the simulation has, whose values need not be right; by default those that a run shows
+            between all that moves.
 
         Examples
         --------
@@ -152,7 +158,7 @@ class Simulation(Structure):
         ...     return {"displacement": my_code(record.time, record.force, lower)}
         >>> d = jfsm.diagnose(record, jfsm.Simulation.from_runs(run, places=[(0, 1)]))
         """
-        return Runs(run, places)
+        return Runs(run, places, form)
 
     @property
     def links(self) -> tuple[tuple[int, int], ...]:
