@@ -5,6 +5,7 @@ from pathlib import Path
 import fmus
 import jax
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
@@ -167,3 +168,60 @@ def as_box(path: Path):
         extra={(1, 2): "f_strut"},
         form=FORM,
     )
+
+
+# Verdicts
+
+
+def note(d: jfsm.Diagnosis, begins: str) -> str:
+    (found,) = [text for text in d.notes if text.startswith(begins)]
+    return found
+
+
+MEMORY = ("jenkins", "coulomb", "bouc_wen", "cubic_hardening", "bilinear_damping", "quadratic_damping")
+
+
+@pytest.mark.slow  # most of it is the search for what the frame itself has
+def test_a_slider_in_the_upper_storey_is_named_and_run_in_the_frame_itself():
+    box = jfsm.Simulation.from_runs(frame_run, places=[(1, 2)])
+    d = jfsm.diagnose(frame_measured(), box, causes=MEMORY, key=KEY)
+    (finding,) = d.findings
+    assert (finding.cause, finding.at) == ("jenkins", (1, 2))
+    assert finding.parameters["k"].value == pytest.approx(STICKS, rel=0.05)
+    assert finding.parameters["slip"].value == pytest.approx(SLIDES / STICKS, rel=0.05)
+    assert note(d, "The gain is that of the simulation itself")
+    assert d.gain is not None and d.gain.closed > 0.95
+
+
+@pytest.mark.slow
+def test_of_a_file_the_same_slider_is_named_with_the_gain_of_its_stand_in():
+    output = jfsm.Record(TIME, displacement=frame_run(frame_measured())["displacement"], at_rest=True)
+    d = jfsm.diagnose(frame_measured(), simulated=output, causes=MEMORY, key=KEY)
+    (finding,) = d.findings
+    assert (finding.cause, finding.at) == ("jenkins", (1, 2))
+    assert note(d, "Gains, too, are those of this structure.")
+
+
+@pytest.mark.slow
+def test_a_one_way_damper_is_named_and_run_in_the_fmu_itself(tmp_path):
+    pytest.importorskip("fmpy")
+    pytest.importorskip("pythonfmu")
+    d = jfsm.diagnose(driven(BUMP, REBOUND, 1), as_box(car(tmp_path)), holdout=driven(BUMP, REBOUND, 2), key=KEY)
+    (finding,) = d.findings
+    assert (finding.cause, finding.at) == ("bilinear_damping", (1, 2))
+    values = d.extended.values()
+    one, way = values["damping@1-2.c"], values["bilinear_damping@1-2.dc"]
+    slopes = {values["bilinear_damping@1-2.side"]: one + way, -values["bilinear_damping@1-2.side"]: one}
+    assert slopes == pytest.approx({1.0: REBOUND, -1.0: BUMP}, rel=0.05)
+    assert note(d, "The gain is that of the simulation itself")
+    assert d.gain is not None and d.gain.closed > 0.9
+
+
+@pytest.mark.slow
+def test_outputs_that_are_a_step_late_are_no_cause(tmp_path):
+    pytest.importorskip("fmpy")
+    pytest.importorskip("pythonfmu")
+    same, other = driven(DAMPER, DAMPER, 1), driven(DAMPER, DAMPER, 2)
+    d = jfsm.diagnose(same, as_box(car(tmp_path, late=True)), holdout=other, key=KEY)
+    assert d.verdict == "consistent" and not d.findings
+    assert "as of the beginning of a step; it was put in time" in note(d, "Car.fmu shows")

@@ -7,8 +7,10 @@ import fmus
 import numpy as np
 import pytest
 from references import smooth_motion
+from typer.testing import CliRunner
 
 import jfsm
+from jfsm.cli import app
 from jfsm.structures import Runs
 
 pytest.importorskip("fmpy")
@@ -189,3 +191,49 @@ def test_an_fmu_that_brings_its_process_down_leaves_this_one_standing(tmp_path):
     path = oscillator(tmp_path, "Down", rates="import os\nos.abort()")
     with pytest.raises(ValueError, match="Down.fmu must come to the end of a run; it brought its process down"):
         jfsm.adapters.fmu.simulation(path, force="F", displacement="x").of(record())
+
+
+@pytest.mark.slow
+def test_the_command_line_runs_an_fmu(plain, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    x = truth()["displacement"]
+    measured = x + 0.01 * np.std(x) * np.random.default_rng(0).standard_normal(x.size)
+    record(displacement=measured).write("run.csv")
+    command = ["diagnose", "run.csv", "--force", "force_1", "--displacement", "displacement_1", "--at-rest"]
+    command += ["--model", str(plain), "--inputs", "force_1=F,0-1=F", "--outputs", "displacement_1=x"]
+    said = CliRunner().invoke(app, [*command, "--parameters", "k=2000", "--cause", "coulomb", "--max-causes", "1"])
+    assert said.exit_code == 1, said.output  # found
+    assert "Of the simulation only its runs are known." in said.output
+    assert "stiffness@0-1.k" in said.output and "The gain is that of the simulation itself" in said.output
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        (["--inputs", "load=F"], "--inputs must give channels such as force_1 or force_2, base_acceleration, or links"),
+        (["--outputs", "force_1=x"], "--outputs must give channels such as displacement_1 or displacement_2; one is"),
+        (["--inputs", "F"], "--inputs must be pairs such as force_1=F,1-2=f_strut; one is 'F'"),
+        (["--parameters", "k=stiff"], "--parameters must be numbers; k is 'stiff'"),
+        (["--joints", "elbow"], "--joints must be left out where --model is no XML of MuJoCo"),
+    ],
+)
+def test_the_command_line_says_what_an_fmu_needs(plain, tmp_path, monkeypatch, given, says):
+    monkeypatch.chdir(tmp_path)
+    record(displacement=np.sin(TIME)).write("run.csv")
+    channels = ["--force", "force_1", "--displacement", "displacement_1"]
+    said = CliRunner().invoke(app, ["diagnose", "run.csv", *channels, "--model", str(plain), *given])
+    assert said.exit_code == 2 and says in " ".join(said.output.split())
+
+
+def test_an_fmu_is_no_model_to_fit(plain, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    record(displacement=np.sin(TIME)).write("run.csv")
+    channels = ["--force", "force_1", "--displacement", "displacement_1"]
+    said = CliRunner().invoke(app, ["fit", "run.csv", *channels, "--model", str(plain), "--out", "x.toml"])
+    assert said.exit_code == 2 and "is an FMU, which can only be run: give it to jfsm diagnose" in " ".join(
+        said.output.split()
+    )
+    Path("m.toml").write_text("mass = [1.0]")
+    command = ["diagnose", "run.csv", *channels, "--model", "m.toml", "--outputs", "displacement_1=x"]
+    said = CliRunner().invoke(app, command)
+    assert said.exit_code == 2 and "--outputs must be left out where --model is no FMU" in " ".join(said.output.split())

@@ -106,8 +106,12 @@ def _forced(simulated: Sequence[Record]) -> bool:
 
 
 def _fitted(form: Structure, simulated: Sequence[Record], way: Reconstruction) -> Structure:
-    """The form with the values of the runs, without dashpots that the runs do not show where no spring is."""
-    found = fit(form, simulated, reconstruction=way)
+    """The form with the values of the runs, without dashpots that the runs do not show where no spring is.
+
+    Where no force is known that could set the scale, its first mass does.
+    """
+    measures_force = any(kind == "force" for run in simulated for kind, _ in run.channels)
+    found = fit(form, simulated, fixed=() if measures_force else ("mass@1",), reconstruction=way)
     springs = {term.at for term in form.terms if term.kind == "stiffness"}
     kept = [
         term

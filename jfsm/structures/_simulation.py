@@ -146,7 +146,7 @@ class Simulation(Structure):
             degree of freedom, measured or not.
         form : Structure, optional
             Masses and links that the simulation has, whose values need not be right; by default those that a run shows
-            between all that moves.
+            between all that moves. Where no force is measured, its first mass sets the scale.
 
         Examples
         --------
