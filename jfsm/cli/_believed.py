@@ -78,7 +78,16 @@ def load_any(
         kind, j = _channel("--outputs", of, tuple(shown))
         shown[kind][j] = name
     values = {name: _number(name, value) for name, value in _pairs("--parameters", parameters)}
-    return fmu.simulation(path, force=force, base_acceleration=base, extra=extra, parameters=values, **shown)
+    return fmu.simulation(
+        path,
+        force=force,
+        base_acceleration=base,
+        displacement=shown["displacement"],
+        velocity=shown["velocity"],
+        acceleration=shown["acceleration"],
+        extra=extra,
+        parameters=values,
+    )
 
 
 def _pairs(option_name: str, text: str | None) -> list[tuple[str, str]]:
