@@ -171,10 +171,11 @@ def driven_alike(simulated: Record, record: Record) -> Record:
     for (kind, dof), samples in (*_forces(record), *simulated.responses.items()):
         columns.setdefault(kind, {})[dof] = np.asarray(samples)
     units = {kind: (record if kind == "force" else simulated).units[kind] for kind in columns}
-    return Record(
+    made = Record(
         record.time, base_acceleration=record.base_acceleration, units=units, at_rest=simulated.at_rest,
         drive=record.drive, name=simulated.name, **columns,
     )  # fmt: skip
+    return made.noted(*simulated.notes)
 
 
 def _forces(record: Record) -> list[tuple[tuple[str, int], Any]]:
