@@ -6,7 +6,8 @@ import pytest
 from references import smooth_motion
 
 import jfsm
-from jfsm.diagnosis.evidence.box_runs import Box, NotRun, as_samples
+from jfsm.diagnosis.evidence.between_samples import as_samples
+from jfsm.diagnosis.evidence.box_runs import Box, NotRun
 
 MASS, STIFFNESS, DAMPING = 1.0, 900.0, 2.0
 TIME = 0.01 * np.arange(1200)

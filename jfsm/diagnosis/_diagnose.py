@@ -132,14 +132,9 @@ def diagnose(
         if runs:
             steps.next("what the simulation does")
             tell = steps.of("what the simulation does")
-            form = model.form if isinstance(model, Runs) else model
-            found = stand_in(runs, form, key, limit, lambda what, done, total: tell(what, total - done))
-            box = Box(model, found.structure, found.drive, whole) if isinstance(model, Runs) else None
-            said = [found.words, *filter(None, map(departure, runs, whole))]
-            said += (
-                ["Gains, too, are those of this structure."] if box is None else [n for run in runs for n in run.notes]
+            records, model, box = _standing_for(
+                model, runs, whole, records, key, limit, lambda what, done, total: tell(what, total - done)
             )
-            records, model = [part.noted(*said) for part in records], found.structure
         assert isinstance(model, Structure)
         d = conduct(records, model, holdout, causes, max_causes, key, places, reconstruction, limit, steps, box)
         steps.end()
@@ -149,6 +144,27 @@ def diagnose(
     )  # fmt: skip
     made = provenance(whole, believed, key, settings, holdout=holdout, simulated=simulated)
     return replace(d, told={**d.told, "provenance": made})
+
+
+def _standing_for(
+    model: Structure | Runs | None,
+    runs: Sequence[Record],
+    whole: Sequence[Record],
+    records: Sequence[Record],
+    key: jax.Array,
+    limit: Limit,
+    tell: Progress,
+) -> tuple[list[Record], Structure, Box | None]:
+    """The records with what is said of the simulation, what stands for it, and itself if it can be run."""
+    found = stand_in(runs, model.form if isinstance(model, Runs) else model, key, limit, tell)
+    said = [found.words, *filter(None, map(departure, runs, whole))]
+    if isinstance(model, Runs):
+        box = Box(model, found.structure, found.drive, whole)
+        said += [note for run in runs for note in run.notes]
+    else:
+        box = None
+        said.append("Gains, too, are those of this structure.")
+    return [part.noted(*said) for part in records], found.structure, box
 
 
 def _runs(

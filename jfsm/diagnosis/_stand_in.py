@@ -110,8 +110,7 @@ def _fitted(form: Structure, simulated: Sequence[Record], way: Reconstruction) -
 
     Where no force is known that could set the scale, its first mass does.
     """
-    measures_force = any(kind == "force" for run in simulated for kind, _ in run.channels)
-    found = fit(form, simulated, fixed=() if measures_force else ("mass@1",), reconstruction=way)
+    found = fit(form, simulated, fixed=() if _measures_force(simulated) else ("mass@1",), reconstruction=way)
     springs = {term.at for term in form.terms if term.kind == "stiffness"}
     kept = [
         term
@@ -120,6 +119,10 @@ def _fitted(form: Structure, simulated: Sequence[Record], way: Reconstruction) -
     ]
     structure = found.structure.having(terms=kept, sensors=form.sensors)
     return structure if len(kept) == len(form.terms) else _fitted(structure, simulated, way)
+
+
+def _measures_force(simulated: Sequence[Record]) -> bool:
+    return any(kind == "force" for run in simulated for kind, _ in run.channels)
 
 
 def _is_sure(found: Fit, path: str) -> bool:

@@ -19,17 +19,16 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
-from scipy.integrate import trapezoid
 from scipy.interpolate import make_interp_spline
-from scipy.linalg import solveh_banded
 
 from ..._result import Result
 from ...dynamics import Response, simulate
 from ...identification import Nuisances
-from ...plant import Reconstruction, direction, excitation, force_along, lower, measured_force
+from ...plant import Reconstruction, direction, force_along, lower, measured_force
 from ...records import Record
 from ...structures import Offset, Runs, Structure
 from ..channels.drift import steady
+from .between_samples import as_samples, between_samples
 from .free_runs import ChannelGain, Gain, StructureOf, blocks_of, interval_of
 from .split import HeldOut
 
@@ -37,8 +36,6 @@ _MOST = 12
 """Runs in which the motion has to come to rest."""
 _RESTS = 5e-3
 """Change of the motion from one run to the next, in its size, below which it has."""
-_FINER = 8
-"""Instants in a sample at which the force of what was found is known: friction turns between samples."""
 _ELSEWHERE = 0.1
 """Share of the force that may act where the simulation takes none, and is left out."""
 _GROWN = 1e3
@@ -58,6 +55,20 @@ class Extended(NamedTuple):
     made: Record
     runs: int
     change: float
+
+
+class _HeldOut(NamedTuple):
+    """A record with what was held out of it, the run with what was found, the errors and the curves of both runs."""
+
+    record: Record
+    extended: Extended
+    off: list[dict[tuple[str, int], np.ndarray]]
+    curves: dict[str, dict[tuple[str, int], np.ndarray]]
+
+    @property
+    def squares(self) -> list[dict[tuple[str, int], float]]:
+        """Mean square errors by channel, before and after."""
+        return [{c: float(np.mean(e**2)) for c, e in errors.items()} for errors in self.off]
 
 
 @dataclass(frozen=True)
@@ -89,27 +100,30 @@ class Box:
         """
         if by_stand_in.horizon is not None:
             raise NotRun("noise alone makes its runs part")
-        squares, blocks, shown, runs, change = [], [], [], 0, 0.0
-        wandering = [fitted.channels[c] for c in fitted.readings.wandering]
-        for part, curve in zip(held, curves, strict=True):
-            whole = part.record if part.of is None else self.whole[part.of]
-            take = _samples(whole, part)
-            found = self.extended(extended(part.of), whole)
-            runs, change = runs + found.runs, max(change, found.change)
-            before = _readings(self.stand_in, self.plain(whole), whole, part.record)
-            after = _readings(extended(part.of), found.made, whole, part.record)
-            pair = {"before": before, "after": after}
-            off = [{c: run[c][take] - y[part.begin :] for c, y in part.record.answers.items()} for run in pair.values()]
-            off = [errors | {c: steady(errors[c]) for c in wandering} for errors in off]
-            squares.append([{c: float(np.mean(e**2)) for c, e in errors.items()} for errors in off])
-            blocks += blocks_of(off, fitted.period / whole.dt)
-            shown.append({**curve, **{name: {c: y[take] for c, y in run.items()} for name, run in pair.items()}})
-        gain = _gain(by_stand_in, squares, np.stack(blocks))
+        found = [self._held_out(part, extended(part.of), fitted) for part in held]
+        blocks = [block for one in found for block in blocks_of(one.off, fitted.period / one.record.dt)]
+        gain = _gain(by_stand_in, [one.squares for one in found], np.stack(blocks))
+        shown = [{**curve, **one.curves} for curve, one in zip(curves, found, strict=True)]
+        runs, change = sum(one.extended.runs for one in found), max(one.extended.change for one in found)
         said = (
             f"The gain is that of the simulation itself, run with the force that it lacks: {runs} runs, the last of "
             f"which moved it by {change:.1%}."
         )
         return gain, shown, said
+
+    def _held_out(self, part: HeldOut, structure: Structure, fitted: Nuisances) -> "_HeldOut":
+        """Runs over what was held out, the simulation as it is and with what a structure has beyond the stand-in."""
+        whole = part.record if part.of is None else self.whole[part.of]
+        take, wandering = _samples(whole, part), [fitted.channels[c] for c in fitted.readings.wandering]
+        found = self.extended(structure, whole)
+        runs = (
+            _readings(self.stand_in, self.plain(whole), whole, part.record),
+            _readings(structure, found.made, whole, part.record),
+        )
+        curves = [{c: y[take] for c, y in run.items()} for run in runs]
+        off = [{c: run[c] - y[part.begin :] for c, y in part.record.answers.items()} for run in curves]
+        off = [errors | {c: steady(errors[c]) for c in wandering} for errors in off]
+        return _HeldOut(whole, found, off, {"before": curves[0], "after": curves[1]})
 
     def plain(self, record: Record) -> Record:
         """The simulation as it is."""
@@ -134,7 +148,7 @@ class Box:
         for run in range(1, _MOST + 1):
             alone = self._run(ours, record, start, force + given)
             lacking = _force_between(ours, record, alone, moved)
-            finely, driving = _between_samples(record, force + lacking, self.drive)
+            finely, driving = between_samples(record, force + lacking, self.drive)
             together = self._run(whole, finely, start, driving, "linear")
             wanted = as_samples(_inertia(ours, finely, together) - driving, held=self.drive == "hold")
             extra, given = self._at_places(record, settling.next(given, wanted))
@@ -169,38 +183,6 @@ class Box:
             taken = ", ".join(f"{i}–{j}" for i, j in places) or "nowhere"
             raise NotRun(f"{left:.0%} of the force acts where it takes none; it takes forces at {taken}")
         return dict(zip(places, shares.T, strict=True)), given
-
-
-def _between_samples(record: Record, force: States, way: Reconstruction) -> tuple[Record, States]:
-    """The clock of a record, finer, with its base, and a force (n, dof) on it."""
-    input = excitation(record, force.shape[1], _FINER // 2, way, force=force)
-    driving, base = (_joined(np.asarray(each)) for each in (input.force, np.asarray(input.base)[..., None]))
-    time = record.time[0] + record.dt / _FINER * np.arange(len(driving))
-    moving = None if record.base_acceleration is None else base[:, 0]
-    return Record(time, force=driving, base_acceleration=moving, at_rest=record.at_rest), driving
-
-
-def _joined(nodes: Float[np.ndarray, "n nodes columns"]) -> Float[np.ndarray, "fine columns"]:
-    """Values between samples, one interval after the other, up to the last sample."""
-    return np.concatenate([nodes[:-1, :-1].reshape(-1, nodes.shape[-1]), nodes[-1:, 0]])
-
-
-def as_samples(fine: Float[np.ndarray, "fine dof"], *, held: bool) -> States:
-    """Samples (n, dof) whose force, held or straight in between, comes closest to one that is known between them."""
-    inside = fine[:-1].reshape(-1, _FINER, fine.shape[1])
-    ends = np.concatenate([inside[1:, 0], fine[-1:]])
-    after = np.concatenate([inside, ends[:, None]], 1)  # every interval with both of its ends
-    share = np.linspace(0.0, 1.0, _FINER + 1)[None, :, None]
-    if held:
-        mean = trapezoid(after, dx=1 / _FINER, axis=1)
-        return np.concatenate([mean, mean[-1:]])
-    load = np.zeros((len(inside) + 1, fine.shape[1]))
-    load[:-1] += trapezoid((1 - share) * after, dx=1 / _FINER, axis=1)
-    load[1:] += trapezoid(share * after, dx=1 / _FINER, axis=1)
-    bands = np.full((2, len(load)), 1 / 6)
-    bands[1] = 2 / 3
-    bands[1, [0, -1]] = 1 / 3
-    return solveh_banded(bands, load)
 
 
 class _Settling:
@@ -292,16 +274,9 @@ def _restoring(structure: Structure, record: Record, x: States, v: States) -> St
 def _readings(structure: Structure, made: Record, whole: Record, shown: Record) -> dict[tuple[str, int], np.ndarray]:
     """What the sensors of a structure would show of a run, in the channels of a record."""
     motion = {kind: np.zeros((len(whole), structure.dof)) for kind in ("displacement", "velocity", "acceleration")}
-    base = 0.0 if whole.base_acceleration is None else np.asarray(whole.base_acceleration)
     for kind, j in shown.answers:
-        y, below = made.channels.get((kind, j)), made.channels.get(("displacement", j))
-        if y is None and below is None:
-            raise NotRun(f"its run does not show {kind} {j}")
-        if y is None:
-            v, a = _rates(whole, np.asarray(below)[:, None])
-            y = v[:, 0] if kind == "velocity" else a[:, 0] + base
         offset = sum(float(s.value) for s in structure.sensors if isinstance(s, Offset) and s.at == (kind, j))
-        motion[kind][:, j - 1] = np.asarray(y) + offset
+        motion[kind][:, j - 1] = _channel(made, whole, kind, j) + offset
     run = Response(
         time=np.asarray(whole.time),
         displacement=motion["displacement"],
@@ -313,6 +288,17 @@ def _readings(structure: Structure, made: Record, whole: Record, shown: Record) 
         _sensors=structure.sensors,
     )
     return run.readings(shown)
+
+
+def _channel(made: Record, whole: Record, kind: str, j: int) -> np.ndarray:
+    """A channel of a run, from its displacement where it does not show it."""
+    if (kind, j) in made.channels:
+        return np.asarray(made.channels[kind, j])
+    if ("displacement", j) not in made.channels:
+        raise NotRun(f"its run does not show {kind} {j}")
+    v, a = _rates(whole, np.asarray(made.channels["displacement", j])[:, None])
+    base = 0.0 if whole.base_acceleration is None else np.asarray(whole.base_acceleration)
+    return v[:, 0] if kind == "velocity" else a[:, 0] + base
 
 
 def _samples(whole: Record, part: HeldOut) -> np.ndarray:
