@@ -203,6 +203,14 @@ def test_of_a_file_the_same_slider_is_named_with_the_gain_of_its_stand_in():
 
 
 @pytest.mark.slow
+def test_a_hardening_that_is_less_is_a_wrong_value_and_no_cause():
+    box = jfsm.Simulation.from_runs(frame_run, places=[(1, 2), (0, 1)])
+    d = jfsm.diagnose(frame_measured(slides=0.0, hardening=0.7 * HARDENING), box, causes=MEMORY, key=KEY)
+    assert d.verdict == "parameters" and all(finding.family == "parameters" for finding in d.findings)
+    assert d.extended.values()["cubic_stiffness@0-1.k3"] == pytest.approx(0.7 * HARDENING, rel=0.05)
+
+
+@pytest.mark.slow
 def test_a_one_way_damper_is_named_and_run_in_the_fmu_itself(tmp_path):
     pytest.importorskip("fmpy")
     pytest.importorskip("pythonfmu")
