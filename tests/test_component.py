@@ -242,7 +242,7 @@ def test_of_friction_that_turns_over_early_the_class_is_named_and_the_law_is_ope
     d = jfsm.diagnose(measured(0.02, 0.8, 2500, 5), model, holdout=held, key=jax.random.key(0))
     (found,) = d.findings
     assert d.verdict == "cause" and found.kind == "dry friction" and found.law_open
-    assert found.size.value == pytest.approx(size, rel=0.15)
+    assert found.size is not None and found.size.value == pytest.approx(size, rel=0.15)
     assert (
         d.gain is not None and d.gain.after <= 1.001 * d.gain.refitted and "refitted" in d.advice
     )  # the law itself would run worse

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 import jfsm
-from jfsm.diagnosis.evidence.free_runs import _interval, how_run, measure_gain
+from jfsm.diagnosis.evidence.free_runs import how_run, interval_of, measure_gain
 from jfsm.diagnosis.evidence.held_out import HeldOutErrors
 from jfsm.diagnosis.evidence.split import HeldOut
 from jfsm.identification import prepare
@@ -24,7 +24,7 @@ def blocks(rng: np.random.Generator, after: float = AFTER, count: int = 20) -> n
 
 def test_nineteen_in_twenty_intervals_hold_the_share_that_is_closed():
     truth, rng = (BEFORE - AFTER) / (BEFORE - FLOOR), np.random.default_rng(0)
-    held = [low <= truth <= high for low, high in (_interval(blocks(rng), FLOOR, rng) for _ in range(400))]
+    held = [low <= truth <= high for low, high in (interval_of(blocks(rng), FLOOR, rng) for _ in range(400))]
     # Of twenty blocks a percentile interval is somewhat short: 93 % are expected, with a standard error of 1.3 %.
     assert 0.88 < np.mean(held) < 0.98
 
@@ -32,7 +32,7 @@ def test_nineteen_in_twenty_intervals_hold_the_share_that_is_closed():
 @pytest.mark.parametrize(("after", "rarely"), [(BEFORE, True), (0.75 * BEFORE, False)])
 def test_a_gain_is_significant_where_there_is_one(after: float, rarely: bool):
     rng = np.random.default_rng(1)
-    significant = np.mean([_interval(blocks(rng, after), FLOOR, rng)[0] > 0 for _ in range(200)])
+    significant = np.mean([interval_of(blocks(rng, after), FLOOR, rng)[0] > 0 for _ in range(200)])
     assert significant < 0.08 if rarely else significant > 0.8
 
 

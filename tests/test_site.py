@@ -15,7 +15,7 @@ DOCS = pages.ROOT / "docs"
 QUICK = ("how-to/records.md",)
 SLOW = (
     *(f"tutorials/{name}.md" for name in ("decay", "shaker", "damper", "robot", "own-simulation")),
-    *(f"how-to/{name}.md" for name in ("maps", "analysis")),
+    *(f"how-to/{name}.md" for name in ("maps", "analysis", "black-boxes")),
 )
 NEEDED = ("mkdocs", "material", "mkdocstrings_handlers", "nbconvert")
 

@@ -134,6 +134,8 @@ def test_a_black_box_is_run_under_what_drives_the_record():
     (finding,) = d.findings
     assert finding.cause == "stiffness_value"
     assert finding.parameters["k"].value == pytest.approx(1.08 * STIFFNESS, rel=0.005)
+    assert note(d, "The gain is that of the simulation itself, run with the force that it lacks")
+    assert d.gain is not None and d.gain.closed > 0.97
 
 
 @pytest.mark.parametrize("made", [dict, lambda motion: jfsm.Record(TIME, **motion)])
@@ -143,6 +145,14 @@ def test_what_drives_the_record_drives_the_run_of_a_black_box(made):
     (run,) = _runs([record], box, None)
     np.testing.assert_array_equal(run.channels["force", 1], record.channels["force", 1])
     np.testing.assert_array_equal(run.channels["displacement", 1], np.sin(TIME))
+
+
+def test_what_a_box_says_of_its_run_stays_with_it():
+    def run(record):
+        return jfsm.Record(TIME, displacement=np.sin(TIME)).noted("A step late, and put in time.")
+
+    (made,) = _runs([measured(0.0)], jfsm.Simulation.from_runs(run), None)
+    assert "A step late, and put in time." in made.notes
 
 
 @pytest.mark.slow  # two searches, of which one is that for the simulation's own spring

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ._believed import Joints, ModelFile, load, save
+from ._believed import Inputs, Joints, ModelFile, Outputs, Parameters, load, load_any, save
 from ._command import FOUND, NOT_FINISHED, command
 from ._input import (
     Channels,
@@ -142,7 +142,7 @@ def fit(
 def diagnose(
     source: RecordFiles,
     model: Annotated[
-        Path | None, option("The model that is believed, TOML or XML of MuJoCo; without it, give --simulated.")
+        Path | None, option("The model that is believed, TOML, XML of MuJoCo or FMU; without it, give --simulated.")
     ] = None,
     simulated: Annotated[
         Path | None,
@@ -166,6 +166,9 @@ def diagnose(
     ] = None,
     laws: OwnLaws = None,
     joints: Joints = None,
+    inputs: Inputs = None,
+    outputs: Outputs = None,
+    parameters: Parameters = None,
     max_causes: Annotated[int, typer.Option(help="Effects that may act at once: 1, or 2.", min=1, max=2)] = 2,
     what_next: Annotated[
         bool, typer.Option("--next", help="Also say what test would tell the two likeliest causes apart.")
@@ -186,11 +189,11 @@ def diagnose(
     if model is None and simulated is None:
         raise ValueError("--model or --simulated must be given: what the simulation is, or what it makes of the test.")
     given = [path for path in (model, simulated) if path is not None]
-    inputs = [*source.records, *given, *(Path(text) for text in holdout or ())]
-    check_outputs({"--report": report, "--json": json, "--extended": extended}, inputs)
+    files = [*source.records, *given, *(Path(text) for text in holdout or ())]
+    check_outputs({"--report": report, "--json": json, "--extended": extended}, files)
     run_laws(laws)
     causes, records, held = causes_named(cause), source.read(), source.held_out(holdout)
-    believed = None if model is None else load(model, joints)
+    believed = None if model is None else load_any(model, joints, inputs, outputs, parameters)
     run = None if simulated is None else source.read_simulated(simulated)
     units = shown_units(out_units, records[0])
     with progress() as tell:

@@ -14,7 +14,9 @@ from .advice.next_test import Leading
 from .channels.clipping import limited
 from .channels.delays import Late, in_time, slightly_late
 from .channels.drift import steadied
+from .evidence.box_runs import Box, NotRun
 from .evidence.fitted import Trial
+from .evidence.free_runs import Gain
 from .evidence.measured import HeldOutRuns, Weighed
 from .evidence.missing_force import Residual, residual
 from .evidence.setup import Problem
@@ -29,6 +31,7 @@ from .report.unfinished import Unfinished
 from .search.rounds import Searched
 from .search.steps import Steps
 from .search.study import Study
+from .verdict.decision import Decision
 from .verdict.judge import judge_in_sign
 
 _ROUNDS = 3
@@ -46,8 +49,10 @@ def conduct(
     reconstruction: Reconstruction | None,
     limit: Limit,
     steps: Steps,
+    box: Box | None = None,
 ) -> Diagnosis:
-    """What `diagnose` returns, within the limit."""
+    """What `diagnose` returns, within the limit; the gain is that of a simulation that can only be run, if it is
+    given and can be run with what was found."""
     looked = looked_at(given, model)
     record, holdout = looked.records, held_out_alike(holdout, looked)
     training, _ = split(record, holdout)
@@ -71,6 +76,7 @@ def conduct(
     judged, tried, winner = behind.problem, behind.found, behind.trial(decision.winner)
     late_forces, (gain, runs) = behind.late(decision), behind.gain(decision)
     extended = behind.extended(decision, {**late, **{channel: tau[0] for channel, tau in late_forces.items()}})
+    gain, runs, said = _of_the_box(box, behind, decision, held, gain, runs)
     steps.next("the missing force")
     term = next(iter(winner.laws), None) if decision.verdict == "cause" else None
     first, fitted, refitted = judged.first, judged.until[0], tried.refitted
@@ -83,7 +89,21 @@ def conduct(
     tested = Tested(tried.trials, tried.behind, tried.left_out, seen, tried.lack.known, unfinished)
     leading = Leading.of(model, [refitted, *tried.trials], lambda t: decision.probability(t.key), first, fitted)
     reached = Reached(decision, winner, term, weighed.evidence, rest, assumed, late_forces)
-    return assemble(reached, clipped, refitted, tested, judged, extended, missing, gain, runs, leading, looked)
+    return assemble(reached, clipped, refitted, tested, judged, extended, missing, gain, runs, leading, looked, said)
+
+
+def _of_the_box(
+    box: Box | None, behind: Weighed, decision: Decision, held: Sequence[HeldOut], gain: Gain | None, runs: list[dict]
+) -> tuple[Gain | None, list[dict], str]:
+    """A gain and the runs behind it, those of a simulation that can only be run where it is one and can be run with
+    what was found; and what is said of that."""
+    if box is None or gain is None or decision.verdict == "consistent":
+        return gain, runs, ""
+    try:
+        return box.gain(behind.handed_out(decision), held, gain, runs, behind.problem.first)
+    except NotRun as why:
+        said = f"The gain is that of this structure: the simulation was not run with what was found, since {why}."
+        return gain, runs, said
 
 
 def _stands_for(term: AbstractTerm | None, winner: Trial, refitted: Trial, problem: Problem) -> Residual:

@@ -18,6 +18,7 @@ from ._conduct import conduct
 from ._diagnosis import Diagnosis
 from ._provenance import plain_settings, provenance
 from ._stand_in import departure, driven_alike, stand_in
+from .evidence.box_runs import Box
 from .evidence.split import records_of
 from .search.steps import Progress, Steps
 
@@ -58,7 +59,8 @@ def diagnose(
         One verdict that must hold on all.
     model : Structure or Simulation.from_runs(...), optional
         The simulation that its owner believes in. Its own values are refitted within its trust (`Structure.uncertain`).
-        One that can only be run is run under what drives every record, and a structure found that stands for it.
+        One that can only be run is run under what drives every record, and a structure found that stands for it; what
+        is found is then run in the simulation itself, where it takes the force, and the gain is its own.
     holdout : float, Record, sequence of Records, or None
         A share is the last part in time, unless what the model lacks shows only there: then it is the first. Where
         nothing drives the structure it is the last part of what is more than noise, run from the release. Records are
@@ -124,18 +126,17 @@ def diagnose(
     records = [part.between(since, until) for part in whole]
     key = jax.random.key(secrets.randbits(32)) if key is None else key
     runs = _runs(whole, model, simulated)
-    believed = model
+    believed, box = model, None
     with shown_by_default(progress) as told, ended_by_interrupt(limit):
         steps = Steps(told, 4 + bool(runs))
         if runs:
             steps.next("what the simulation does")
             tell = steps.of("what the simulation does")
-            form = model if isinstance(model, Structure) else None
-            found = stand_in(runs, form, key, limit, lambda what, done, total: tell(what, total - done))
-            said = [found.words, *filter(None, map(departure, runs, whole))]
-            records, model = [part.noted(*said) for part in records], found.structure
+            records, model, box = _standing_for(
+                model, runs, whole, records, key, limit, lambda what, done, total: tell(what, total - done)
+            )
         assert isinstance(model, Structure)
-        d = conduct(records, model, holdout, causes, max_causes, key, places, reconstruction, limit, steps)
+        d = conduct(records, model, holdout, causes, max_causes, key, places, reconstruction, limit, steps, box)
         steps.end()
     settings = plain_settings(
         holdout=holdout, causes=causes, max_causes=max_causes, since=since, until=until, places=places,
@@ -143,6 +144,27 @@ def diagnose(
     )  # fmt: skip
     made = provenance(whole, believed, key, settings, holdout=holdout, simulated=simulated)
     return replace(d, told={**d.told, "provenance": made})
+
+
+def _standing_for(
+    model: Structure | Runs | None,
+    runs: Sequence[Record],
+    whole: Sequence[Record],
+    records: Sequence[Record],
+    key: jax.Array,
+    limit: Limit,
+    tell: Progress,
+) -> tuple[list[Record], Structure, Box | None]:
+    """The records with what is said of the simulation, what stands for it, and itself if it can be run."""
+    found = stand_in(runs, model.form if isinstance(model, Runs) else model, key, limit, tell)
+    said = [found.words, *filter(None, map(departure, runs, whole))]
+    if isinstance(model, Runs):
+        box = Box(model, found.structure, found.drive, whole)
+        said += [note for run in runs for note in run.notes]
+    else:
+        box = None
+        said.append("Gains, too, are those of this structure.")
+    return [part.noted(*said) for part in records], found.structure, box
 
 
 def _runs(

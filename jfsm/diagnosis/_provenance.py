@@ -15,7 +15,7 @@ import jax
 import numpy as np
 
 from ..records import Reading, Record, file_fingerprint, fingerprint
-from ..structures import CauseLike, Structure, causes_of
+from ..structures import CauseLike, Runs, Structure, causes_of
 from ._diagnosis import Diagnosis
 from .evidence.split import records_of
 from .report.plain_data import jfsm_version, written_model
@@ -140,9 +140,14 @@ def _parts(model: Any) -> Iterator[bytes]:
         yield repr(model.trust).encode()
         for leaf in jax.tree.leaves(model):
             yield np.asarray(leaf).tobytes() if hasattr(leaf, "dtype") else repr(leaf).encode()
+    if isinstance(model, Runs):
+        yield repr(model.places).encode()
+        yield "\n".join(model.form.describe() if model.form is not None else ()).encode()
     function = model.own.function if isinstance(model, Structure) and model.own else getattr(model, "_run", None)
     if (code := getattr(function, "__code__", None)) is not None:
         yield from _code(code)
+    if isinstance(digest := getattr(function, "digest", None), bytes):
+        yield digest
 
 
 def _code(code: CodeType) -> Iterator[bytes]:

@@ -47,7 +47,7 @@ class StandIn(NamedTuple):
         between = _BETWEEN.get(self.drive, "")
         return (
             "Of the simulation only its runs are known. A structure stands for it and follows them to "
-            f"{error} of the motion: {parts}.{between} Values and gains are those of this structure."
+            f"{error} of the motion: {parts}.{between} Values are those of this structure."
         )
 
 
@@ -106,8 +106,11 @@ def _forced(simulated: Sequence[Record]) -> bool:
 
 
 def _fitted(form: Structure, simulated: Sequence[Record], way: Reconstruction) -> Structure:
-    """The form with the values of the runs, without dashpots that the runs do not show where no spring is."""
-    found = fit(form, simulated, reconstruction=way)
+    """The form with the values of the runs, without dashpots that the runs do not show where no spring is.
+
+    Where no force is known that could set the scale, its first mass does.
+    """
+    found = fit(form, simulated, fixed=() if _measures_force(simulated) else ("mass@1",), reconstruction=way)
     springs = {term.at for term in form.terms if term.kind == "stiffness"}
     kept = [
         term
@@ -116,6 +119,10 @@ def _fitted(form: Structure, simulated: Sequence[Record], way: Reconstruction) -
     ]
     structure = found.structure.having(terms=kept, sensors=form.sensors)
     return structure if len(kept) == len(form.terms) else _fitted(structure, simulated, way)
+
+
+def _measures_force(simulated: Sequence[Record]) -> bool:
+    return any(kind == "force" for run in simulated for kind, _ in run.channels)
 
 
 def _is_sure(found: Fit, path: str) -> bool:
@@ -167,10 +174,11 @@ def driven_alike(simulated: Record, record: Record) -> Record:
     for (kind, dof), samples in (*_forces(record), *simulated.responses.items()):
         columns.setdefault(kind, {})[dof] = np.asarray(samples)
     units = {kind: (record if kind == "force" else simulated).units[kind] for kind in columns}
-    return Record(
+    made = Record(
         record.time, base_acceleration=record.base_acceleration, units=units, at_rest=simulated.at_rest,
         drive=record.drive, name=simulated.name, **columns,
     )  # fmt: skip
+    return made.noted(*simulated.notes)
 
 
 def _forces(record: Record) -> list[tuple[tuple[str, int], Any]]:

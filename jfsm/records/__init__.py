@@ -38,3 +38,4 @@ from jfsm.records._tones import tones as tones
 from jfsm.records._unit_factors import UnitFactor as UnitFactor
 from jfsm.records._unit_factors import likely_unit as likely_unit
 from jfsm.records._unit_factors import miss as miss
+from jfsm.records._units import find_unit as find_unit

@@ -11,7 +11,6 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .._types import as_numbers, is_traced
-from ..records import Record
 from ._own_motion import Acceleration, EvaluatedMotion, OwnMotion
 from ._runs import Runs
 from ._sensors import AbstractSensor
@@ -127,7 +126,9 @@ class Simulation(Structure):
         return Simulation(own, dof, parameters, terms, sensors, trust)
 
     @staticmethod
-    def from_runs(run: Callable[[Record], Any]) -> Runs:
+    def from_runs(
+        run: Callable[..., Any], places: Iterable[tuple[int, int]] = (), form: Structure | None = None
+    ) -> Runs:
         """A simulation that can only be run, for `diagnose`, which finds a structure that stands for it.
 
         Parameters
@@ -135,15 +136,29 @@ class Simulation(Structure):
         run : callable
             ``run(record)`` gives the motion that the simulation makes of what drives the record: a `Record`, a
             `Response`, or a mapping of ``"displacement"``, ``"velocity"`` or ``"acceleration"`` to (n,) or (n, dof)
-            arrays on the record's clock. It repeats itself, and does not know the force before it acts.
+            arrays, or to ``{dof: (n,)}``, on the record's clock. It repeats itself, and does not know the force before
+            it acts.
+        places : links, optional
+            Where it takes forces beside those of the record. It is then called as ``run(record, extra)``, too: `extra`
+            holds samples (n,) [N] by link, ``{(1, 2): samples}``, each force pushing the link's second end and pulling
+            its first; (0, j) is a force on degree of freedom j. What is found is then run in the simulation itself, if
+            it lies at these places, or where a force of the record acts, and a run shows the displacement of every
+            degree of freedom, measured or not.
+        form : Structure, optional
+            Masses and links that the simulation has, whose values need not be right; by default those that a run shows
+            between all that moves. Where no force is measured, its first mass sets the scale.
 
         Examples
         --------
         >>> def run(record):
         ...     return {"displacement": my_code(record.time, record.force)}
         >>> d = jfsm.diagnose(record, jfsm.Simulation.from_runs(run))
+        >>> def run(record, extra=None):
+        ...     lower = 0.0 if extra is None else extra[0, 1]
+        ...     return {"displacement": my_code(record.time, record.force, lower)}
+        >>> d = jfsm.diagnose(record, jfsm.Simulation.from_runs(run, places=[(0, 1)]))
         """
-        return Runs(run)
+        return Runs(run, places, form)
 
     @property
     def links(self) -> tuple[tuple[int, int], ...]:

@@ -110,7 +110,7 @@ def measure_gain(
     total = _of_all_channels(channels)
     spreads = np.array([c.spread for c in channels.values()])
     blocks = np.stack([block for each in compared for block in each.blocks])
-    interval = _interval(np.mean(blocks / spreads**2, -1), total["floor"], rng)
+    interval = interval_of(np.mean(blocks / spreads**2, -1), total["floor"], rng)
     gain = Gain(
         **total, channels=channels, interval=interval, beyond_refit=beyond_refit, horizon=horizon, astray=astray
     )
@@ -196,7 +196,7 @@ def _compared(
     squares = {name: {c: float(np.mean(error**2)) for c, error in errors.items()} for name, errors in off.items()}
     left = {c: float(np.mean(each[:, course.counted] ** 2)) + noise.get(c, 0.0) ** 2 for c, each in draws.items()}
     curves = {"record": course.record[course.begin :], **{name: course.shown(run) for name, run in runs.items()}}
-    blocks = _blocks([off[without], off["after"]], period)
+    blocks = blocks_of([off[without], off["after"]], period)
     in_one_run = length is None and part.record.drive == "force"
     apart = agrees_for(draws, spread, course.begin, period) if in_one_run else None
     agrees = None if apart is None else apart * course.record.dt
@@ -220,14 +220,14 @@ def _channel_gains(
     }
 
 
-def _blocks(off: Sequence[Mapping[tuple, np.ndarray]], period: float) -> list[np.ndarray]:
+def blocks_of(off: Sequence[Mapping[tuple, np.ndarray]], period: float) -> list[np.ndarray]:
     """Mean square errors (runs, channels) of contiguous blocks of the readings that are counted."""
     errors = np.stack([[error**2 for error in errors.values()] for errors in off])
     count = int(np.clip(errors.shape[-1] / (_BLOCK * period), _FEWEST, _MOST_BLOCKS))
     return [block.mean(-1) for block in np.array_split(errors, min(count, errors.shape[-1]), axis=-1)]
 
 
-def _interval(blocks: np.ndarray, floor: float, rng: np.random.Generator) -> tuple[float, float]:
+def interval_of(blocks: np.ndarray, floor: float, rng: np.random.Generator) -> tuple[float, float]:
     """95 % interval of the share closed, from mean square errors (blocks, 2) before and after.
 
     References

@@ -24,7 +24,7 @@ from .as_recorded import change_by_times
 from .evidence import Evidence, Measure, SetAside, Setting, has_map, map_on
 from .fitted import Trial
 from .found_again import FoundAgain
-from .free_runs import Gain, measure_gain
+from .free_runs import Gain, StructureOf, measure_gain
 from .held_out import HeldOutErrors
 from .identifiable import in_step, untold
 from .missing_force import stand_in
@@ -90,6 +90,11 @@ class Weighed:
         key = self._handed_out(decision)
         self._held_out(key)
         return self.runs.get(key, (None, []))
+
+    def handed_out(self, decision: Decision) -> StructureOf:
+        """What is handed out, by record."""
+        key = self._handed_out(decision)
+        return (lambda record: self.held_out.model) if key == GIVEN else self.trial(key).extended
 
     def late(self, decision: Decision) -> Lateness:
         """How late the forces are beside what was decided, by channel."""

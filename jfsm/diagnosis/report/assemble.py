@@ -83,8 +83,9 @@ def assemble(
     runs: list[dict],
     leading: Leading | None,
     looked: Looked,
+    on_gain: str = "",
 ) -> Diagnosis:
-    """The diagnosis, with everything that the report needs."""
+    """The diagnosis, with everything that the report needs; `on_gain` is a note on whose the gain is."""
     decision, unfinished, model, records = reached.decision, tested.unfinished, problem.model, problem.records
     first, verdict = records[0], decision.verdict
     units, imposed = first.record.units, first.path is not None
@@ -96,7 +97,7 @@ def assemble(
     between = [] if verdict == "consistent" else differences(winner)
     differ = [difference_sentence(one, unit_of(winner.structure, one.path, units)) for one in between]
     said = times_of_forces(reached.late, first, reached.assumed)
-    notes = tuple(dict.fromkeys([*_notes(unfinished, problem, differ, winner, gain), *said]))
+    notes = tuple(dict.fromkeys([*_notes(unfinished, problem, differ, winner, gain), *said, *filter(None, [on_gain])]))
     smallest = smallest_effects(tested.seen, units)
     shape = _shape(missing if verdict in ("undecided", "unnamed") else reached.rest)
     drawn = Drawn(missing, runs, reached.term, first.record, first.period, with_shape=verdict != "consistent")
