@@ -7,6 +7,7 @@ belong to the beginning of a step, and an acceleration that a force reaches at o
 
 import difflib
 import hashlib
+import io
 import math
 import pickle
 import shutil
@@ -294,9 +295,7 @@ class _Box:
             if columns
         ]
         each = np.concatenate([np.asarray(part) for part in parts], -1) if parts else np.zeros((len(record), 3, 0))
-        both = each @ np.array(
-            [[one.name == name for name in self._names] for one in (*self._inputs, *self._extra)], float
-        )
+        both = each @ self._sums
         inside = both[: len(record) - 1]
         held = inside[:, 1::2].reshape(-1, both.shape[-1])
         points = np.concatenate([inside[:, :-1:2].reshape(-1, both.shape[-1]), inside[-1:, -1]])
@@ -339,8 +338,7 @@ class _Box:
             "changes": self._spread(points),
         }
         found = self._done(job)
-        for name, value in self._parameters.items():
-            is_now = found["stated"][name]
+        for (name, value), is_now in zip(self._parameters.items(), found["stated"], strict=True):
             if not abs(is_now - value) <= _READ_BACK * max(abs(is_now), abs(value)):
                 raise ValueError(
                     f"`parameters` must go into {self._path.name}; {name} was set to {value:g} and is {is_now:g}. It "
@@ -362,7 +360,7 @@ class _Box:
     def _reference(self, name: str) -> tuple[str, int]:
         return self._known[name].type, self._known[name].valueReference
 
-    def _done(self, job: Mapping[str, Any]) -> dict[str, Any]:
+    def _done(self, job: Mapping[str, Any]) -> dict[str, np.ndarray]:
         """What came of a run, which has a process to itself: an FMU may bring down the one that it is in."""
         script = str(Path(__file__).with_name("_fmu_run.py"))
         ran = subprocess.run([sys.executable, "-P", script], input=pickle.dumps(job), capture_output=True, check=False)
@@ -372,7 +370,8 @@ class _Box:
                 f"{self._path.name} must come to the end of a run; it brought its process down (exit status "
                 f"{ran.returncode}).{f' It says: {said}' if said else ''}"
             )
-        found = pickle.loads(ran.stdout)
+        with np.load(io.BytesIO(ran.stdout), allow_pickle=False) as archive:
+            found = dict(archive)
         if "refused" in found:
             raise ValueError(f"{self._path.name} must {found['refused']}{f' It says: {said}' if said else ''}")
         return found
