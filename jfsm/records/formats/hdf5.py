@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from jfsm.records.formats.base import ABOUT, AbstractFormat, Contents, Lazy, left_out
+from jfsm.records.formats.expansion import OversizeError, require_room
 from jfsm.records.formats.hdf5_texts import numbers_of, text_of
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ class Hdf5Format(AbstractFormat):
         def visit(name: str, item: Any) -> None:
             if not hasattr(item, "dtype") or item.shape is None:
                 return
-            if not isinstance(name, str) or item.external:  # a name that is no text comes as bytes
+            if not isinstance(name, str) or _is_elsewhere(item):  # a name that is no text comes as bytes
                 skipped.append(f"{name} (stored outside the file)" if isinstance(name, str) else repr(name))
                 return
             places.update(_places(name, item))
@@ -71,6 +72,11 @@ class Hdf5Format(AbstractFormat):
             for name, array in contents.arrays.items():
                 file.create_dataset(name, data=array)
                 file[name].attrs["units"] = contents.units.get(name, "1")
+
+
+def _is_elsewhere(item: Any) -> bool:
+    """Whether numbers of a dataset lie in other files, which a file from a stranger could name at will."""
+    return bool(item.external) or item.is_virtual and any(source.file_name != "." for source in item.virtual_sources())
 
 
 def _places(name: str, item: Any) -> dict[str, tuple[str, str | None]]:
@@ -135,10 +141,14 @@ def opened(path: Path, demand: str) -> Iterator["h5py.File"]:
     with file:
         try:
             yield file
+        except OversizeError:
+            raise
         except Exception as error:  # whatever the library stumbles over in a part that is damaged
             raise ValueError(f"{demand}; parts of it cannot be read ({error}). Write or copy it again.") from error
 
 
 def dataset(file: "h5py.File", name: str) -> np.ndarray:
     """All values of one dataset."""
-    return np.asarray(file[name][()])  # pyright: ignore[reportIndexIssue]  # a name that was found to be a dataset
+    found: Any = file[name]  # a name that was found to be a dataset
+    require_room(found.size * found.dtype.itemsize, Path(file.filename))
+    return np.asarray(found[()])

@@ -10,6 +10,7 @@ import scipy.io
 
 from jfsm.records.formats import mat73
 from jfsm.records.formats.base import ABOUT, AbstractFormat, Contents, Lazy
+from jfsm.records.formats.expansion import OversizeError
 from jfsm.records.formats.hdf5 import NUMERIC
 from jfsm.records.formats.mat5 import require_sound
 
@@ -29,6 +30,8 @@ class MatFormat(AbstractFormat):
             variables = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)
         except NotImplementedError:  # of version 7.3
             return _found(mat73.variables(path)).contents({}, path)
+        except OversizeError:
+            raise
         except Exception as error:  # whatever the reader stumbles over in bytes that are no such file
             raise ValueError(
                 f"{path.name} must be a MATLAB file; it cannot be opened as one ({error}), and may be cut short. "
