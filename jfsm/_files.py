@@ -1,10 +1,12 @@
 """Writing files so that a reader sees the old ones or the new ones, never half of one."""
 
 import errno
+import json
 import os
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 
 def write_text_atomically(path: str | os.PathLike[str], text: str) -> None:
@@ -44,6 +46,33 @@ def write_atomically(files: Mapping[str | os.PathLike[str], bytes]) -> None:
             part.unlink(missing_ok=True)
 
 
+def as_path(path: Any, name: str = "path") -> Path:
+    """A path of the operating system.
+
+    Raises
+    ------
+    TypeError
+        If it is none.
+    """
+    if isinstance(path, str | os.PathLike):
+        return Path(path)
+    raise TypeError(f"`{name}` must be a path, as {name}='run7.csv'; it was {path!r}.")
+
+
+def parsed_json(text: str | bytes) -> Any:
+    """What a text of JSON says.
+
+    Raises
+    ------
+    ValueError
+        If it is none, or nested deeper than Python follows.
+    """
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+
+
 def replaceable(path: str | os.PathLike[str]) -> Path:
     """The file that a path stands for, behind symbolic links, if a file may be put there.
 
@@ -52,7 +81,7 @@ def replaceable(path: str | os.PathLike[str]) -> Path:
     ValueError
         If a device, a pipe or a socket stands there, which a file would take the place of.
     """
-    target = Path(os.path.realpath(path))
+    target = Path(os.path.realpath(as_path(path)))
     if target.exists() and not (target.is_file() or target.is_dir()):
         raise ValueError(f"`path` must be a file; {path} is a device, a pipe or a socket. Choose another name.")
     return target

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from jfsm.records import read
-from jfsm.records.formats.hdf5_texts import _reference, numbers_of, text_of
+from jfsm.records.formats.hdf5_texts import _references, numbers_of, text_of
 
 N = 40
 
@@ -59,7 +59,7 @@ def test_texts_of_variable_length_are_found_in_headers_of_either_version(tmp_pat
     path = _file(tmp_path / "a.h5", **how)
     with h5py.File(path) as file, path.open("rb") as stream:
         address = h5py.h5o.get_info(file["x"].id).addr
-        reference = _reference(stream, file.userblock_size, address, b"units")
+        reference = _references(stream, file.userblock_size, address, b"units", 1)
         assert reference is not None and struct.unpack("<IQI", reference)[::2] == (2, 3)
         file_texts = [text_of(file[name], "units") for name in ("time", "F", "x")]
         assert file_texts == ["s", "kN", "mm"]

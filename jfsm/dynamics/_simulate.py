@@ -22,6 +22,8 @@ from ..plant import (
     alone,
     bucket,
     check_pair,
+    check_reconstruction,
+    check_window,
     excitation,
     force_limits,
     force_needed,
@@ -42,7 +44,7 @@ from ..plant import (
     typical_size,
     undelayed,
 )
-from ..records import Record, mended
+from ..records import Record, as_record, mended
 from ..structures import (
     AbstractFriction,
     AbstractSensor,
@@ -56,6 +58,7 @@ from ..structures import (
     MapTerm,
     Offset,
     Structure,
+    as_model,
     check_order,
 )
 from ..surrogates import AbstractForceStateMap, tabulate
@@ -287,7 +290,11 @@ def simulate(
     """
     require_x64()
     check_order("jfsm.simulate(model, record)", model, record)
+    as_model(model)
+    as_record(record)
     check_scheme(solver, tolerance)
+    check_reconstruction(reconstruction)
+    check_window(window)
     check_pair(model, record, imposed=True)
     record = mended(record)
     model = with_tables(model)

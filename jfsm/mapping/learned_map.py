@@ -50,7 +50,7 @@ def check_method(method: str, mass: float | None, order: int | None) -> None:
     if method == "joint" and mass is None:
         raise ValueError('`method="joint"` maps all of the force on a single mass: give `mass`, and no model.')
     least = 1 if method == "rkpm" else 0
-    if order is not None and order < least:
+    if order is not None and not (isinstance(order, int | np.integer) and order >= least):
         raise ValueError(f"`order` must be an integer of {least} or more; got {order!r}.")
 
 

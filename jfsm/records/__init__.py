@@ -11,6 +11,11 @@ from jfsm.records._defects import defects as defects
 from jfsm.records._defects import spikes as spikes
 from jfsm.records._fingerprint import file_fingerprint as file_fingerprint
 from jfsm.records._fingerprint import fingerprint as fingerprint
+from jfsm.records._given import as_record as as_record
+from jfsm.records._given import check_together as check_together
+from jfsm.records._given import records_of as records_of
+from jfsm.records._given import require_one_unit as require_one_unit
+from jfsm.records._given import shared_readings as shared_readings
 from jfsm.records._listing import Listing as Listing
 from jfsm.records._listing import listing as listing
 from jfsm.records._look import LOOKS as LOOKS
@@ -38,3 +43,4 @@ from jfsm.records._tones import tones as tones
 from jfsm.records._unit_factors import UnitFactor as UnitFactor
 from jfsm.records._unit_factors import likely_unit as likely_unit
 from jfsm.records._unit_factors import miss as miss
+from jfsm.records.formats import format_to_write as format_to_write

@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Samples = TypeVar("Samples", NDArray[np.float64], NDArray[np.bool_])
+MOST_DOFS = 10_000
+"""More than anyone measures; a number in the place of a name counts as one otherwise."""
 Columns = tuple[tuple[int, ...], NDArray[np.float64]]
 
 
@@ -40,6 +42,20 @@ def as_time(time: Any, factor: float) -> NDArray[np.float64]:
     return frozen(clock)
 
 
+def as_instant(name: str, given: Any) -> float:
+    """One number, of seconds or per second, as a float.
+
+    Raises
+    ------
+    TypeError
+        If it is none.
+    """
+    number = np.asarray(given)
+    if number.dtype.kind not in "iuf" or number.ndim:
+        raise TypeError(f"`{name}` must be one number; it was {given!r}.")
+    return float(number)
+
+
 def as_columns(kind: str, given: Any, time: NDArray[np.float64], factor: float) -> Columns:
     """The dofs that a channel argument mentions, ascending, and their samples, (n, dofs) in the coherent unit.
 
@@ -58,6 +74,11 @@ def as_columns(kind: str, given: Any, time: NDArray[np.float64], factor: float) 
                 )
             if dof < 1:
                 raise ValueError(f"`{kind}` given by dof counts from 1 (0 is ground); one key is {dof}. Number from 1.")
+            if dof > MOST_DOFS:
+                raise ValueError(
+                    f"`{kind}` given by dof counts degrees of freedom, {MOST_DOFS} at most; one key is {dof}. Number "
+                    "them from 1 on, without gaps."
+                )
         dofs = tuple(sorted(int(dof) for dof in given))
         samples = np.empty((time.size, len(dofs)), order="F")
         for place, dof in enumerate(dofs):

@@ -248,7 +248,8 @@ def _require_raw(choice: Choice, unit: str | None, written: str, reading: str) -
 def _unit(contents: Contents, source: str, choice: Choice, units: Mapping[str, str]) -> str | None:
     """Unit of a channel, from what the caller says and else from what the file states."""
     given = _said(units, choice)
-    stated = contents.units.get(choice.array)
+    of_column = None if choice.column is None else contents.units.get(f"{choice.array}[{choice.column}]")
+    stated = of_column or contents.units.get(choice.array)
     if given is not None or stated is None:
         return given
     try:

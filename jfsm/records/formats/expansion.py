@@ -1,5 +1,6 @@
-"""How large what a file holds may become in memory: asked before it is unpacked, so that a small file cannot fill it."""
+"""How large what a file holds becomes in memory: asked before it is unpacked, so that a small file cannot fill it."""
 
+import math
 import os
 import re
 import zipfile
@@ -34,8 +35,8 @@ def require_room(size: float, path: Path) -> None:
     limit = _limit()
     if size > 1e9 * limit:
         raise OversizeError(
-            f"{path.name} must hold at most {limit:g} GB once it is unpacked; it holds {size / 1e9:.3g} GB. If it is "
-            f"what it should be, set {LIMIT}={1.5 * size / 1e9:.2g} in the environment; else copy it again."
+            f"{path.name} must take at most {limit:g} GB of memory once it is unpacked; it takes {size / 1e9:.3g} GB. "
+            f"If it should, set {LIMIT}={math.ceil(1.1 * size / 1e9)} in the environment; else copy it again."
         )
 
 

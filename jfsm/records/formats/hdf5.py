@@ -10,7 +10,7 @@ import numpy as np
 
 from jfsm.records.formats.base import ABOUT, AbstractFormat, Contents, Lazy, left_out
 from jfsm.records.formats.expansion import OversizeError, require_room
-from jfsm.records.formats.hdf5_texts import numbers_of, text_of
+from jfsm.records.formats.hdf5_texts import numbers_of, text_of, texts_of
 
 if TYPE_CHECKING:
     import h5py
@@ -38,12 +38,14 @@ class Hdf5Format(AbstractFormat):
         def visit(name: str, item: Any) -> None:
             if not hasattr(item, "dtype") or item.shape is None:
                 return
-            if not isinstance(name, str) or _is_elsewhere(item):  # a name that is no text comes as bytes
+            if not isinstance(name, str) or is_elsewhere(item):  # a name that is no text comes as bytes
                 skipped.append(f"{name} (stored outside the file)" if isinstance(name, str) else repr(name))
                 return
             places.update(_places(name, item))
-            if unit := text_of(item, "units") or text_of(item, "unit"):
-                units[name] = unit
+            stated = _units(name, item)
+            units.update(stated)
+            if not stated and (ignored := [key for key in ("units", "unit") if key in item.attrs]):
+                notes.append(f"The {ignored[0]} of {name!r} are {_shown(item, ignored[0])}, and are not used.")
             if item.dtype.kind not in NUMERIC and not item.dtype.names:
                 skipped.append(name)
             if packing := _packing(item):
@@ -74,7 +76,23 @@ class Hdf5Format(AbstractFormat):
                 file[name].attrs["units"] = contents.units.get(name, "1")
 
 
-def _is_elsewhere(item: Any) -> bool:
+def _units(name: str, item: Any) -> dict[str, str]:
+    """The unit that a dataset states, or those of its columns, where it lists one for each."""
+    listed = texts_of(item, "units") or texts_of(item, "unit")
+    if len(set(listed)) == 1:
+        return {name: listed[0]} if listed[0] else {}
+    if item.ndim == 2 and len(listed) == min(item.shape):
+        return {f"{name}[{place}]": unit for place, unit in enumerate(listed) if unit}
+    return {}
+
+
+def _shown(item: Any, key: str) -> str:
+    """An attribute in words, in short."""
+    listed = texts_of(item, key)
+    return f"a list of {len(listed)}, {', '.join(map(repr, listed[:3]))}" if listed else "no text"
+
+
+def is_elsewhere(item: Any) -> bool:
     """Whether numbers of a dataset lie in other files, which a file from a stranger could name at will."""
     return bool(item.external) or item.is_virtual and any(source.file_name != "." for source in item.virtual_sources())
 
@@ -149,6 +167,10 @@ def opened(path: Path, demand: str) -> Iterator["h5py.File"]:
 
 def dataset(file: "h5py.File", name: str) -> np.ndarray:
     """All values of one dataset."""
-    found: Any = file[name]  # a name that was found to be a dataset
-    require_room(found.size * found.dtype.itemsize, Path(file.filename))
-    return np.asarray(found[()])
+    return whole(file[name])
+
+
+def whole(item: Any) -> np.ndarray:
+    """All values of a dataset, if there is room for them."""
+    require_room(item.size * item.dtype.itemsize, Path(item.file.filename))
+    return np.asarray(item[()])

@@ -18,25 +18,31 @@ _NOWHERE = (0, 2**64 - 1)
 
 
 def text_of(item: Any, name: str) -> str:
-    """The text of an attribute; empty if there is none, or it is none.
+    """The text of an attribute; empty if there is none, it is none, or it holds several.
 
     Raises
     ------
     ValueError
         If it is damaged.
     """
+    found = texts_of(item, name)
+    return found[0] if len(found) == 1 else ""
+
+
+def texts_of(item: Any, name: str) -> list[str]:
+    """The texts in an attribute, in their order; none if it holds anything else. Errors as of `text_of`."""
     import h5py
 
     if name not in item.attrs:
-        return ""
+        return []
     attribute = h5py.h5a.open(item.id, name.encode())
-    kind = attribute.get_type()
-    if kind.get_class() != h5py.h5t.STRING or attribute.get_space().get_simple_extent_npoints() != 1:
-        return ""
-    if kind.is_variable_str() and not _is_sound(item, name):
+    kind, count = attribute.get_type(), attribute.get_space().get_simple_extent_npoints()
+    if kind.get_class() != h5py.h5t.STRING or not 0 < count <= _MANY:
+        return []
+    if kind.is_variable_str() and not _is_sound(item, name, count):
         raise ValueError(f"the text {name!r} of {item.name!r} is damaged")
-    value = np.ravel(np.asarray(item.attrs[name]))[0]
-    return (value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)).strip()
+    values = np.ravel(np.asarray(item.attrs[name])).tolist()
+    return [(v.decode("utf-8", "replace") if isinstance(v, bytes) else str(v)).strip() for v in values]
 
 
 def numbers_of(item: Any, name: str) -> np.ndarray:
@@ -55,24 +61,24 @@ class _Message(NamedTuple):
     body: bytes
 
 
-def _is_sound(item: Any, name: str) -> bool:
-    """Whether the text lies where its reference says, in a heap that is whole, as far as that can be looked up."""
+def _is_sound(item: Any, name: str, count: int) -> bool:
+    """Whether the texts lie where their references say, in heaps that are whole, as far as that can be looked up."""
     import h5py.h5o
 
     base = item.file.userblock_size
     try:
         with open(item.file.filename, "rb") as stream:
-            reference = _reference(stream, base, h5py.h5o.get_info(item.id).addr, name.encode())
-            if reference is None:
-                return True
-            length, heap, index = struct.unpack("<IQI", reference)
-            return heap in _NOWHERE or length <= _sizes(stream, base + heap).get(index, -1)
+            references = _references(stream, base, h5py.h5o.get_info(item.id).addr, name.encode(), count)
+            return references is None or all(
+                heap in _NOWHERE or length <= _sizes(stream, base + heap).get(index, -1)
+                for length, heap, index in struct.iter_unpack("<IQI", references)
+            )
     except (struct.error, ValueError):
         return False
 
 
-def _reference(stream: BinaryIO, base: int, address: int, name: bytes) -> bytes | None:
-    """The sixteen bytes that stand for a text in the header of an object; None where they lie elsewhere."""
+def _references(stream: BinaryIO, base: int, address: int, name: bytes, count: int) -> bytes | None:
+    """The sixteen bytes that stand for each text in the header of an object; None where they lie elsewhere."""
     for message in _messages(stream, base, address):
         if message.kind != _ATTRIBUTE or message.flags & _SHARED:
             continue
@@ -81,7 +87,7 @@ def _reference(stream: BinaryIO, base: int, address: int, name: bytes) -> bytes 
         if message.body[place : place + sizes[0]].rstrip(b"\0") == name:
             rounded = sizes if version != 1 else [(size + 7) // 8 * 8 for size in sizes]
             place += sum(rounded)
-            return message.body[place : place + 16]
+            return message.body[place : place + 16 * count]
     return None
 
 

@@ -1,12 +1,12 @@
 """Columns of numbers in JSON."""
 
-import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
+from jfsm._files import parsed_json
 from jfsm.records.formats.base import AbstractFormat, Contents
 from jfsm.records.formats.headings import headings_of
 
@@ -26,7 +26,7 @@ class JsonFormat(AbstractFormat):
 
     def load(self, path: Path) -> Contents:
         try:
-            given = json.loads(path.read_bytes())
+            given = parsed_json(path.read_bytes())
         except ValueError as error:
             raise ValueError(f"{path.name} must be JSON; {error}. Write or copy it again.") from error
         if isinstance(given, list):

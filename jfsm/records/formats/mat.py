@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 import scipy.io
 
+from jfsm._files import parsed_json
 from jfsm.records.formats import mat73
 from jfsm.records.formats.base import ABOUT, AbstractFormat, Contents, Lazy
 from jfsm.records.formats.expansion import OversizeError
@@ -37,7 +38,10 @@ class MatFormat(AbstractFormat):
                 f"{path.name} must be a MATLAB file; it cannot be opened as one ({error}), and may be cut short. "
                 f"Write or copy it again."
             ) from error
-        remarks = json.loads(str(variables.pop(ABOUT))) if ABOUT in variables else {}
+        try:
+            remarks = parsed_json(str(variables.pop(ABOUT))) if ABOUT in variables else {}
+        except ValueError as error:
+            raise ValueError(f"{path.name} must hold JSON in {ABOUT}; {error}. Write or copy it again.") from error
         return _found(variables).contents(remarks, path)
 
     def save(self, path: Path, contents: Contents) -> None:
