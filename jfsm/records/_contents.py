@@ -2,7 +2,7 @@
 
 import contextlib
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -213,6 +213,8 @@ def _held(source: str, samples: Mapping[str, Any]) -> list[str]:
 def _by_dof(contents: Contents, source: str, kind: str, names: ChannelName) -> dict[int | None, Choice]:
     """What was asked for by dof, under None where one name stands for all of a kind."""
     by_dof: Mapping[Any, str]
+    if names is not None and not isinstance(names, Iterable):
+        raise TypeError(f"`{kind}` must be the name of a channel, a list of names, or names by dof; got {names!r}.")
     if isinstance(names, str):
         by_dof = {None: names}
     elif isinstance(names, Mapping):

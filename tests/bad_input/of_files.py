@@ -106,7 +106,7 @@ def _book(stage: Stage, far: str = "") -> Path:
 
 def _decimal_comma(stage: Stage, field: str) -> jfsm.Record:
     """A file with decimal commas, one force of which is written so."""
-    rows = csv_text(delimiter=";").replace(".", ",").splitlines()
+    rows = csv_text("time;F;x", delimiter=";").replace(".", ",").splitlines()
     time, _, motion = rows[50].split(";")
     rows[50] = f"{time};{field};{motion}"
     return stage.read(stage.file("a.csv", "\n".join(rows) + "\n"))
@@ -161,7 +161,7 @@ ROWS: list[Row] = [
     right("UTF-16", lambda s: s.read(s.file("a.csv", csv_text().encode("utf-16"))), len),
     refused("objects in an archive", lambda s: s.read(_npz(s, F=FORCE.astype(object))), r"`force` must name .*Left out: F \(Python objects, which are not opened\)"),
     refused("objects in an array", lambda s: s.read(_saved(s, np.array([{}], dtype=object))), r"a\.npy must be an array of numbers .*Save the numbers alone"),
-    refused("texts in an archive", lambda s: s.read(_npz(s, F=np.array(["a"] * 400))), r"force"),
+    refused("texts in an archive", lambda s: s.read(_npz(s, F=np.array(["a"] * 400))), r"`force` must hold real numbers; it holds <U1", TypeError),
     refused("an archive that is cut short", lambda s: s.read(_cut(_npz(s))), r"a\.npz must be an archive of numpy\.savez.*cut short\. Write"),
     right("a member that would leave its folder", lambda s: jfsm.read(_npz(s, **{"../../F": FORCE}), force="../../F", displacement="x"), len),
     refused("an archive of 6 GB", lambda s: s.read(_bomb(s)), r"bomb\.npz must take at most 4 GB of memory .*it takes 6 GB\. If it should, set JFSM_LARGEST_GB=7"),
@@ -188,10 +188,10 @@ ROWS: list[Row] = [
     refused("a DataFrame with two columns of one name", lambda s: jfsm.read(pd.concat([_frame(), _frame()[["x"]]], axis=1), force="F", displacement="x"), r"`displacement` must name one channel of the DataFrame; 'x' may be"),
     refused("a number", lambda s: jfsm.read(3), r"`source` must be the path of a file, .*it was int\. For arrays", TypeError),
     refused("nothing", lambda s: jfsm.read(None), r"`source` must be the path of a file, .*it was NoneType", TypeError),
-    refused("a number for a channel", lambda s: jfsm.read(s.file("a.csv", csv_text()), force=3), r"force", TypeError),
+    refused("a number for a channel", lambda s: jfsm.read(s.file("a.csv", csv_text()), force=3), r"`force` must be the name of a channel, .*got 3", TypeError),
     refused("a rate of nothing", lambda s: s.read(s.file("a.csv", csv_text("a,F,x")), rate=0.0), r"`rate`"),
-    refused("a rate as text", lambda s: s.read(s.file("a.csv", csv_text("a,F,x")), rate="fast"), r"`rate`", TypeError),
-    refused("units as text", lambda s: s.read(s.file("a.csv", csv_text()), units="N"), r"`units`", TypeError),
+    refused("a rate as text", lambda s: s.read(s.file("a.csv", csv_text("a,F,x")), rate="fast"), r"`rate` must be one number; it was 'fast'", TypeError),
+    refused("units as text", lambda s: s.read(s.file("a.csv", csv_text()), units="N"), r"`units` must name channels that are read, .*it names 'N'"),
     refused("a run as a list", lambda s: s.read(s.file("a.csv", csv_text()), run=[1]), r"`run`"),
     refused("rest as text", lambda s: s.read(s.file("a.csv", csv_text()), at_rest="no"), r"`at_rest` must be True or False", TypeError),
 ]  # fmt: skip

@@ -33,7 +33,7 @@ def _m(stage: Stage) -> jfsm.Structure:
 GOOD = "mass = [1.0]\n"
 
 ROWS: list[Row] = [
-    refused("a mass as text", lambda s: _s(mass="1"), r"`mass` must hold real numbers; got dtype <U1", TypeError),
+    refused("a mass of text", lambda s: _s(mass="1"), r"`mass` must hold real numbers; got dtype <U1", TypeError),
     refused("no mass", lambda s: _s(mass=None), r"`mass` must hold real numbers", TypeError),
     refused("no masses", lambda s: _s(mass=[]), r"`mass` must hold at least one mass, none negative; got \[\]"),
     refused("a negative mass", lambda s: _s(mass=[-1.0]), r"none negative; got \[-1\.0\]"),
