@@ -1,4 +1,4 @@
-"""Every command line of the table ends with its exit code and one line on standard error, before anything is computed."""
+"""Every command line of the table ends with its exit code and one line on standard error, before any calculation."""
 
 import os
 import re
