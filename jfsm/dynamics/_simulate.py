@@ -483,7 +483,7 @@ def _by_dof(force: Any, record: Record, dof: int) -> Any:
 
 def check_scheme(solver: Any, tolerance: Any) -> None:
     """Refuse a solver that there is not, or a tolerance that step control cannot keep."""
-    if solver not in get_args(Solver):
+    if not isinstance(solver, str) or solver not in get_args(Solver):
         raise ValueError(f'`solver` must be "reference" or "grid"; got {solver!r}. Leave it out for "reference".')
     number = isinstance(tolerance, int | float | np.number) and not isinstance(tolerance, bool)
     if not number or not _TIGHTEST <= tolerance <= _LOOSEST:

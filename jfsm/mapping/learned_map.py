@@ -45,7 +45,7 @@ def check_method(method: str, mass: float | None, order: int | None) -> None:
     ValueError
         If there is no such method, it needs a mass, or the order is too low for it.
     """
-    if method not in ("rkpm", "kriging", "joint"):
+    if not isinstance(method, str) or method not in ("rkpm", "kriging", "joint"):
         raise ValueError(f'`method` must be "rkpm", "kriging" or "joint"; got {method!r}.')
     if method == "joint" and mass is None:
         raise ValueError('`method="joint"` maps all of the force on a single mass: give `mass`, and no model.')

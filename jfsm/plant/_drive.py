@@ -23,7 +23,7 @@ def check_reconstruction(method: Any) -> None:
     ValueError
         With the ways that there are.
     """
-    if method not in get_args(Reconstruction):
+    if not isinstance(method, str) or method not in get_args(Reconstruction):
         raise ValueError(f'`reconstruction` must be "band-limited", "linear" or "hold"; got {method!r}.')
 
 

@@ -1,6 +1,7 @@
 """What was measured: records, their files, their units and their noise."""
 
 from jfsm.records._advance import advanced as advanced
+from jfsm.records._channels import as_instant as as_instant
 from jfsm.records._checks import strongest_frequency as strongest_frequency
 from jfsm.records._combine import align as align
 from jfsm.records._combine import join as join

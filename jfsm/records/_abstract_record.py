@@ -8,7 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jfsm.records._advance import advanced
-from jfsm.records._channels import Columns, as_columns, as_instant, as_single, as_time, frozen
+from jfsm.records._channels import (
+    Columns,
+    as_columns,
+    as_instant,
+    as_single,
+    as_time,
+    frozen,
+    require_mapping,
+)
 from jfsm.records._resample import long_gaps, resampled
 from jfsm.records._units import KINDS, coherent_units, find_unit
 
@@ -42,8 +50,9 @@ class AbstractRecord:
         drive: Drive = "force",
         name: str | None = None,
     ):
-        if drive not in ("force", "motion"):
+        if not isinstance(drive, str) or drive not in ("force", "motion"):
             raise ValueError(f'`drive` must be "force" or "motion"; it was {drive!r}. Say which of them is imposed.')
+        require_mapping("units", units, "{'force': 'kN'}")
         for kind in units or {}:
             if kind not in ("time", *KINDS):
                 raise ValueError(f"`units` must be given by kind, one of time, {', '.join(KINDS)}; it names {kind!r}.")

@@ -1,6 +1,7 @@
 """What a record is given, checked and brought into one shape: columns of finite doubles, one for each measured dof."""
 
 from collections.abc import Mapping
+from numbers import Real
 from typing import Any, TypeVar
 
 import numpy as np
@@ -50,10 +51,23 @@ def as_instant(name: str, given: Any) -> float:
     TypeError
         If it is none.
     """
-    number = np.asarray(given)
-    if number.dtype.kind not in "iuf" or number.ndim:
-        raise TypeError(f"`{name}` must be one number; it was {given!r}.")
-    return float(number)
+    if isinstance(given, Real | np.number) and not isinstance(given, bool):
+        return float(given)
+    if isinstance(given, np.ndarray) and given.ndim == 0 and given.dtype.kind in "iuf":
+        return float(given)
+    raise TypeError(f"`{name}` must be one number; it was {given!r}.")
+
+
+def require_mapping(name: str, given: Any, example: str) -> None:
+    """Refuse what says nothing by name; None says nothing.
+
+    Raises
+    ------
+    TypeError
+        With an example.
+    """
+    if given is not None and not isinstance(given, Mapping):
+        raise TypeError(f"`{name}` must be given by name, as {example}; it was {given!r}.")
 
 
 def as_columns(kind: str, given: Any, time: NDArray[np.float64], factor: float) -> Columns:
@@ -123,6 +137,8 @@ def _real(name: str, given: Any) -> NDArray[np.float64]:
     """A copy in double precision; masked samples become NaN, so that they are refused with the others."""
     try:
         array = np.ma.asanyarray(given) if isinstance(given, np.ma.MaskedArray) else np.asarray(given)
+    except TypeError:  # of things that only look like a sequence
+        raise TypeError(f"`{name}` must hold real numbers; it was {given!r}. Pass an array.") from None
     except ValueError as error:
         raise ValueError(f"`{name}` must be a rectangular array: {error}. Pass columns of equal length.") from None
     if array.dtype.kind not in "iuf":

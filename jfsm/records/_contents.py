@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jfsm.records._abstract_record import AbstractRecord, AnyRecord, Drive
+from jfsm.records._channels import require_mapping
 from jfsm.records._repeats import repetition
 from jfsm.records._units import KINDS, find_sensitivity, find_unit
 from jfsm.records.formats.base import Contents, point_name
@@ -72,6 +73,7 @@ def record_of(
 
     Errors are those of `read`.
     """
+    _require_words(asked)
     chosen = {kind: _by_dof(contents, source, kind, names) for kind, names in _names(contents, source, asked).items()}
     every = [choice for choices in chosen.values() for choice in choices.values()]
     units, sensitivity = asked.units or {}, asked.sensitivity or {}
@@ -210,10 +212,21 @@ def _held(source: str, samples: Mapping[str, Any]) -> list[str]:
     ]
 
 
+def _require_words(asked: Asked) -> None:
+    """Refuse what is no name where one is asked for."""
+    require_mapping("units", asked.units, "{'F': 'kN'}")
+    require_mapping("sensitivity", asked.sensitivity, "{'a1': '100 mV/g'}")
+    for name, given in (("time", asked.time), ("base_acceleration", asked.wanted[-1])):
+        if given is not None and not isinstance(given, str):
+            raise TypeError(f"`{name}` must be the name of a channel; got {given!r}.")
+
+
 def _by_dof(contents: Contents, source: str, kind: str, names: ChannelName) -> dict[int | None, Choice]:
     """What was asked for by dof, under None where one name stands for all of a kind."""
     by_dof: Mapping[Any, str]
-    if names is not None and not isinstance(names, Iterable):
+    given = [names] if isinstance(names, str) else names.values() if isinstance(names, Mapping) else names
+    listed = isinstance(given, Iterable) and not hasattr(given, "dtype") and all(isinstance(n, str) for n in given)
+    if given is not None and not listed:
         raise TypeError(f"`{kind}` must be the name of a channel, a list of names, or names by dof; got {names!r}.")
     if isinstance(names, str):
         by_dof = {None: names}

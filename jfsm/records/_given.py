@@ -39,7 +39,8 @@ def records_of(given: Any, name: str = "record") -> list[Record]:
     """
     if isinstance(given, Record):
         return [given]
-    if isinstance(given, str | bytes | PathLike | Mapping) or not isinstance(given, Iterable):
+    no_list = isinstance(given, str | bytes | PathLike | Mapping) or hasattr(given, "dtype")  # nor an array
+    if no_list or not isinstance(given, Iterable):
         return [as_record(given, name)]
     found = [as_record(item, name) for item in given]
     if not found:

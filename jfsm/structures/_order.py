@@ -1,5 +1,6 @@
 """What is given in the places of a record and a model."""
 
+import math
 from collections.abc import Sequence
 from os import PathLike
 from typing import Any
@@ -66,7 +67,7 @@ def check_terms(model: Structure) -> None:
         )
 
 
-def check_places(places: Any, dof: int) -> None:
+def check_places(places: Any, dof: float = math.inf) -> None:
     """Refuse places that are no links of a structure with so many degrees of freedom; None leaves them open.
 
     Raises
@@ -78,11 +79,12 @@ def check_places(places: Any, dof: int) -> None:
         return
     if isinstance(places, str) or not isinstance(places, Sequence):
         raise TypeError(f"`places` must be a list of links, as [(0, 1)]; got {places!r}.")
+    numbers = f"1 to {dof}" if dof < math.inf else "from 1 on"
     for place in places:
         pair = tuple(place) if isinstance(place, Sequence) and not isinstance(place, str) else ()
         if len(pair) != 2 or len(set(pair)) != 2 or not all(isinstance(j, int) and 0 <= j <= dof for j in pair):
             raise ValueError(
-                f"`places` must be links (i, j) between two of ground (0) and the degrees of freedom 1 to {dof}; one "
+                f"`places` must be links (i, j) between two of ground (0) and the degrees of freedom {numbers}; one "
                 f"is {place!r}. A load on degree of freedom j is at (0, j)."
             )
 

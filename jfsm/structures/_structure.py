@@ -62,7 +62,10 @@ class Structure(eqx.Module):
         self.mass = jnp.atleast_1d(jnp.asarray(masses))
         self.terms = _parts(terms, "terms", AbstractTerm)
         self.sensors = _parts(sensors, "sensors", AbstractSensor)
-        self.trust = tuple(dict(trust).items())
+        try:
+            self.trust = tuple(dict(trust).items())
+        except (TypeError, ValueError):
+            raise TypeError(f"`trust` must be shares by name, as {{'stiffness': 0.05}}; got {trust!r}.") from None
         self.own, self.own_numbers = None, np.zeros(0)
         for term in self.terms:
             if not isinstance(term, AbstractTerm):
@@ -336,9 +339,10 @@ def _parts(given: Any, name: str, kind: type) -> tuple[Any, ...]:
     """Terms or sensor effects in their order, one alone among them."""
     if isinstance(given, kind):
         return (given,)
-    if not isinstance(given, Iterable):
-        raise TypeError(f"`{name}` must be a list; got {given!r}.")
-    return tuple(given)
+    try:
+        return tuple(given)
+    except TypeError:
+        raise TypeError(f"`{name}` must be a list; got {given!r}.") from None
 
 
 def _check_mass(mass: np.ndarray) -> None:

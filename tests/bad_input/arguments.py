@@ -150,7 +150,9 @@ def _outcome(call: Callable[[], Any], names: list[str]) -> tuple[str, str]:
         native = re.search(
             r"not supported between|has no attribute|object is not|unpack|could not be safely|unexpected keyword", words
         )
-        return ("clear" if not native and re.search(r"`|\.csv|arameter", words) else "unclear"), words
+        return (
+            "clear" if not native and re.search(r"`|\.csv|arameter|wrong way round|directory", words) else "unclear"
+        ), words
     except Exception as error:
         return "trace", "".join(traceback.format_exception(error)[-3:])
 
@@ -204,7 +206,7 @@ def _ended(words: list[str]) -> tuple[str, str]:
         return "right", "begins"
     except _HangError:
         return "hang", ""
-    said = " ".join(ended.stderr.split())
+    said = " ".join((ended.stderr or ended.stdout).split())
     if ended.exit_code in (0, 1, 3) and not (ended.exception and not isinstance(ended.exception, SystemExit)):
         return "right", f"exit {ended.exit_code}"
     if ended.exit_code != 2:

@@ -18,7 +18,7 @@ STATES = np.random.default_rng(0).standard_normal((60, 2))
 READINGS = STATES[:, 0] + 0.1 * STATES[:, 1]
 
 
-class ReachedError(Exception):
+class ReachedError(BaseException):
     """The calculation would begin now: everything before it let the input pass."""
 
 
@@ -67,7 +67,7 @@ class Row:
     name: str
     call: Callable[[Stage], Any]
     says: str = ""
-    error: type[Exception] = ValueError
+    error: type[BaseException] = ValueError
     right: Callable[[Any], Any] | None = None
 
 
