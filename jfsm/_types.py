@@ -61,6 +61,8 @@ def as_scalar(value: Any) -> Float[Array, ""]:
             raise TypeError(f"A parameter must be one real number; got {value!r}.")
         if not np.isfinite(number):
             raise ValueError(f"A parameter must be finite; got {value!r}.")
+    elif not jnp.issubdtype(value.dtype, jnp.number):
+        raise TypeError(f"A parameter must be one real number; got {value!r}.")
     return jnp.asarray(value, dtype=jnp.float64)
 
 

@@ -6,6 +6,9 @@ Counted are: right (refused nothing that is wrong, or the calculation would have
 names the argument, the option or the file), unclear (a message that does not), trace (anything else) and hang.
 """
 
+# pyright: reportArgumentType=false, reportCallIssue=false
+# Wrong types are what is tried.
+
 import collections
 import os
 import re
@@ -52,7 +55,7 @@ def _wrong(rng: np.random.Generator) -> Any:
     values: list[Any] = [
         None, True, 0, -1, 2, 1.5, NAN, float("inf"), 10**12, 1j, "", "a", "mass", "x" * 5000, b"x", [], [1], [None], (), (1, 2),
         {}, {"a": 1}, {1: 2}, object(), np.array(3.0), np.zeros((2, 2)), np.full(400, NAN), np.array(["a"]), T[::-1],
-        Path("none.csv"), len, int, record(), [record()], jfsm.Structure.sdof(1.0, 9.0, 0.1), jax.random.key(0), np.datetime64("2024"),
+        Path("none.csv"), int, record(), [record()], jfsm.Structure.sdof(1.0, 9.0, 0.1), jax.random.key(0), np.datetime64("2024"),
         range(3), {"displacement": MOTION}, slice(3), jfsm.LinearStiffness(1.0, at=(0, 1)), np.zeros(0), FORCE.astype(object),
     ]  # fmt: skip
     return values[int(rng.integers(len(values)))]

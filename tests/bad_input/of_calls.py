@@ -1,5 +1,8 @@
 """Arguments of the public functions that are of the wrong type, out of range, swapped, or do not go together."""
 
+# pyright: reportArgumentType=false, reportCallIssue=false
+# Wrong types are what is tried.
+
 from typing import Any
 
 import jax

@@ -106,6 +106,7 @@ LINES = [
     Line("a number that stays", "fit run.csv --model m.toml --out f.toml --fixed foo", r"--fixed names 'foo', which the structure does not have"),
     Line("another drive", "inspect run.csv --drive wind", r'--drive must be "force" or "motion"; it was \'wind\''),
     Line("an unknown method", "map run.csv --model m.toml --method foo", r'--method must be "rkpm", "kriging" or "joint"'),
+    Line("a file of laws that is none", f"{DIAGNOSE} --laws m.toml", r"A file of laws must end in \.py; it was m\.toml"),
     Line("no files", "batch nope* --model m.toml --out b", r"FILES must be files, or a pattern .*'nope\*' matches none"),
     Line("a file for a folder", "batch run.csv --model m.toml --out m.toml", r"`out` must be a folder; .*m\.toml is a file"),
     Line("a record for a diagnosis", "why run.csv", r"run\.csv must be what `jfsm diagnose --json run\.csv` writes"),

@@ -1,5 +1,8 @@
 """Files that are damaged, renamed, hostile or ambiguous."""
 
+# pyright: reportArgumentType=false, reportCallIssue=false
+# Wrong types are what is tried.
+
 import io
 import json
 import zipfile
@@ -191,8 +194,8 @@ ROWS: list[Row] = [
     refused("a number for a channel", lambda s: jfsm.read(s.file("a.csv", csv_text()), force=3), r"`force` must be the name of a channel, .*got 3", TypeError),
     refused("a rate of nothing", lambda s: s.read(s.file("a.csv", csv_text("a,F,x")), rate=0.0), r"`rate`"),
     refused("a rate as text", lambda s: s.read(s.file("a.csv", csv_text("a,F,x")), rate="fast"), r"`rate` must be one number; it was 'fast'", TypeError),
-    refused("units as text", lambda s: s.read(s.file("a.csv", csv_text()), units="N"), r"`units` must name channels that are read, .*it names 'N'"),
-    refused("a run as a list", lambda s: s.read(s.file("a.csv", csv_text()), run=[1]), r"`run`"),
+    refused("units as text", lambda s: s.read(s.file("a.csv", csv_text()), units="N"), r"`units` must be given by name, as .*it was 'N'", TypeError),
+    refused("a run as a list", lambda s: s.read(s.file("a.csv", csv_text()), run=[1]), r"`run` must be a number from 1 on, or a title; got \[1\]", TypeError),
     refused("rest as text", lambda s: s.read(s.file("a.csv", csv_text()), at_rest="no"), r"`at_rest` must be True or False", TypeError),
 ]  # fmt: skip
 

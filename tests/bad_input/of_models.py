@@ -1,5 +1,8 @@
 """Structures that cannot be, and files that hold none."""
 
+# pyright: reportArgumentType=false, reportCallIssue=false
+# Wrong types are what is tried.
+
 import copy
 import pickle
 

@@ -1,5 +1,8 @@
 """Arrays that make no record, and calls of records that mean nothing."""
 
+# pyright: reportArgumentType=false, reportCallIssue=false
+# Wrong types are what is tried.
+
 import copy
 import pickle
 from pathlib import Path
@@ -58,7 +61,7 @@ ROWS = [
     refused("a truth as dof", lambda s: R(force={True: FORCE}), r"must have integers as keys; one is True", TypeError),
     refused("a huge dof", lambda s: R(displacement={10**12: MOTION}), r"10000 at most; one key is 1000000000000\. Number them from 1"),
     refused("no channel of a kind", lambda s: R(force={}), r"`force` must hold at least one channel; it is empty\. Leave"),
-    refused("a unit alone", lambda s: R(units="N"), r"`units` must be given by kind, .*names 'N'"),
+    refused("a unit alone", lambda s: R(units="N"), r"`units` must be given by name, as .*it was 'N'", TypeError),
     refused("units by channel", lambda s: R(units={"F": "N"}), r"`units` must be given by kind, .*names 'F'"),
     refused("an unknown unit", lambda s: R(units={"force": "furlong"}), r"`units` of force must be a unit .*'furlong'\. Convert"),
     refused("a unit of another kind", lambda s: R(units={"force": "mm"}), r"`units` of force must be .*it was 'mm'"),

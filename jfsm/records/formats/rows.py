@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jfsm.records._channels import require_mapping
 from jfsm.records.formats.base import Contents, Lazy
 from jfsm.records.formats.lookup import choose, listed, samples_of
 
@@ -20,7 +19,6 @@ def rows_where(contents: Contents, source: str, where: Mapping[str, str | float]
     ValueError
         If a column does not exist, is no single column, is not as long as another, or if no row is left.
     """
-    require_mapping("where", where, "{'run': 3}")
     mask = np.empty(0, dtype=bool)
     for name, value in where.items():
         column = _column(contents, source, name, value)
