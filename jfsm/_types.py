@@ -56,11 +56,13 @@ def as_scalar(value: Any) -> Float[Array, ""]:
     if isinstance(value, bool | str) or value is None:
         raise TypeError(f"A parameter must be a real number; got {value!r}.")
     if not isinstance(value, jax.Array):
-        number = np.asarray(value)
+        number = np.asarray(value) if np.isscalar(value) or hasattr(value, "dtype") else np.empty(0, object)
         if number.dtype.kind not in "iuf" or number.ndim:
             raise TypeError(f"A parameter must be one real number; got {value!r}.")
         if not np.isfinite(number):
             raise ValueError(f"A parameter must be finite; got {value!r}.")
+    elif not jnp.issubdtype(value.dtype, jnp.number):
+        raise TypeError(f"A parameter must be one real number; got {value!r}.")
     return jnp.asarray(value, dtype=jnp.float64)
 
 
@@ -73,7 +75,10 @@ def as_array(value: Any, name: str, ndim: int | tuple[int, ...]) -> np.ndarray:
         If `value` is not numeric, has other axes, or holds NaN or infinity; names the argument `name`.
     """
     require_x64()
-    array = np.asarray(value)
+    try:
+        array = np.asarray(value)
+    except TypeError:  # of things that only look like a sequence, and of keys of jax.random
+        raise TypeError(f"`{name}` must hold real numbers; got {value!r}.") from None
     if array.dtype.kind not in "iufb":
         raise TypeError(f"`{name}` must hold real numbers; got dtype {array.dtype}.")
     allowed = (ndim,) if isinstance(ndim, int) else ndim

@@ -20,6 +20,7 @@ ROOMS = (
     "_threads",
     "_processes",
     "_files",
+    "_terminal",
     "_programs",
     "_traced",
     "_map_reader",

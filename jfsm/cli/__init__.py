@@ -8,6 +8,7 @@ Whatever is slow to import is imported by the command that needs it.
 import os
 import sys
 
+from .._terminal import spell_streams
 from . import _commands, _fleet, _models  # noqa: F401  (their commands are part of the program)
 from ._command import NOT_FINISHED, app
 
@@ -16,6 +17,7 @@ __all__ = ["app", "main"]
 
 def main() -> None:
     """The program ``jfsm``."""
+    spell_streams()
     try:
         app()
     except SystemExit as end:

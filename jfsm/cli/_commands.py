@@ -74,8 +74,10 @@ def simulate(
     With --drive motion, the force that the record's motion needs.
     """
     from ..dynamics import simulate
+    from ..records import format_to_write
 
     check_outputs({"--out": out}, [source.record, model])
+    format_to_write(out)
     run_laws(laws)
     record = source.read()
     response = simulate(load(model, joints), record)

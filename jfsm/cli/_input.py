@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import typer
 
+from .._files import check_writable
+
 if TYPE_CHECKING:
     import jax
 
@@ -249,6 +251,8 @@ def is_even(record: "Record") -> bool:
 def random_key(seed: int | None) -> "jax.Array | None":
     import jax
 
+    if seed is not None and not 0 <= seed < 2**63:
+        raise ValueError(f"--key must be a whole number from 0 to {2**63 - 1}; it was {seed}.")
     return None if seed is None else jax.random.key(seed)
 
 
@@ -282,6 +286,15 @@ def check_outputs(outputs: Mapping[str, Path | None], inputs: Sequence[Path]) ->
             raise ValueError(f"{name} must not be a file that is needed: {path} {taken[place]}. Choose another name.")
         if place.is_dir() or not place.parent.is_dir():
             raise ValueError(f"{name} must be a file in a folder that exists; it was {path}. Make the folder first.")
+        try:
+            check_writable(path)
+        except OSError as error:
+            why = getattr(error.__cause__, "strerror", None) or error
+            raise ValueError(
+                f"{name} must be a file that can be written; it was {path} ({why}). Choose another place."
+            ) from error
+        except ValueError as error:
+            raise ValueError(f"{error}".replace("`path`", name)) from error
         taken[place] = f"is {name} already"
 
 

@@ -59,6 +59,10 @@ def laws_of(path: Path) -> dict[str, Any]:
 
     if not path.is_file():
         raise FileNotFoundError(f"There is no file of laws {path}.")
+    if path.suffix != ".py":
+        raise ValueError(
+            f"A file of laws must end in .py; it was {path}. Laws are classes of Python (docs/own-laws.md)."
+        )
     module = _run(path.resolve())
     laws = {law.__name__: law for law in own_laws().values() if law.__module__ == module}
     if not laws:

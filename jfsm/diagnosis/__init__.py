@@ -1,6 +1,8 @@
 """What is wrong: candidates, evidence, verdict, gain."""
 
 from .._result import Estimate as Estimate
+from ._arguments import check_settings as check_settings
+from ._arguments import held_records as held_records
 from ._compare import Sides as Sides
 from ._compare import compare as compare
 from ._compare import compare_numbers as compare_numbers

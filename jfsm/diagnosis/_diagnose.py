@@ -11,15 +11,15 @@ from .._programs import programs_kept
 from .._threads import small_matrices
 from .._types import require_x64
 from ..plant import Reconstruction
-from ..records import Record
+from ..records import Record, check_together, records_of
 from ..reporting import shown_by_default
-from ..structures import CauseLike, Runs, Structure, check_order
+from ..structures import MODEL, CauseLike, Runs, Structure, check_order, check_places, check_terms, remedy
+from ._arguments import check_holdout, check_settings
 from ._conduct import conduct
 from ._diagnosis import Diagnosis
 from ._provenance import plain_settings, provenance
 from ._stand_in import departure, driven_alike, stand_in
 from .evidence.box_runs import Box
-from .evidence.split import records_of
 from .search.steps import Progress, Steps
 
 
@@ -117,15 +117,17 @@ def diagnose(
     """
     require_x64()
     check_order("jfsm.diagnose(record, model)", model, record)
-    if max_causes < 1:
-        raise ValueError(f"`max_causes` must be at least 1; got {max_causes}.")
-    if time_limit is not None and not time_limit > 0:
-        raise ValueError(f"`time_limit` must be positive, in seconds; got {time_limit:g}. Without it there is none.")
+    check_settings(causes, max_causes, key, reconstruction, time_limit, progress)
     limit = Limit(time_limit)
     whole = records_of(record)
     records = [part.between(since, until) for part in whole]
+    check_together(records)
+    check_holdout(records, holdout)
     key = jax.random.key(secrets.randbits(32)) if key is None else key
     runs = _runs(whole, model, simulated)
+    if isinstance(model, Structure):
+        check_places(places, model.dof)
+        check_terms(model)
     believed, box = model, None
     with shown_by_default(progress) as told, ended_by_interrupt(limit):
         steps = Steps(told, 4 + bool(runs))
@@ -182,11 +184,9 @@ def _runs(
             raise ValueError("`simulated` must be left out where `model` makes runs itself.")
         return [driven_alike(model.tried_on(record), record) for record in records]
     if model is not None and not isinstance(model, Structure):
-        raise TypeError(
-            f"`model` must be a structure, such as jfsm.Structure.sdof(1.0, 9.0, 0.1), or a simulation; got {model!r}."
-        )
+        raise TypeError(f"`model` must be {MODEL}; got {model!r}.{remedy(model)}")
     if simulated is not None:
-        runs = records_of(simulated)
+        runs = records_of(simulated, "simulated")
         return [driven_alike(run, records[min(i, len(records) - 1)]) for i, run in enumerate(runs)]
     if model is None:
         raise ValueError(

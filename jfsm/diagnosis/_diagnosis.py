@@ -124,7 +124,7 @@ class Diagnosis:
         from ..reporting import render_page, shown_in, write_text_atomically
 
         with shown_in(out_units(units)):
-            write_text_atomically(Path(path), render_page(self.data))
+            write_text_atomically(path, render_page(self.data))
 
     def to_json(self, path: str | Path) -> None:
         """Write every number of the verdict as JSON, in the record's units, which stand beside each."""
@@ -132,7 +132,7 @@ class Diagnosis:
 
         from ..reporting import write_text_atomically
 
-        write_text_atomically(Path(path), json.dumps(self.data, indent=1, allow_nan=False))
+        write_text_atomically(path, json.dumps(self.data, indent=1, allow_nan=False))
 
     @classmethod
     def load(cls, path: str | Path) -> "Diagnosis":

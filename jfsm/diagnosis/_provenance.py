@@ -14,10 +14,9 @@ from typing import Any
 import jax
 import numpy as np
 
-from ..records import Reading, Record, file_fingerprint, fingerprint
+from ..records import Reading, Record, file_fingerprint, fingerprint, records_of
 from ..structures import CauseLike, Runs, Structure, causes_of
 from ._diagnosis import Diagnosis
-from .evidence.split import records_of
 from .report.plain_data import jfsm_version, written_model
 
 _COUNTED = ("jax", "jaxlib", "numpy", "scipy", "equinox", "diffrax", "optimistix", "lineax")

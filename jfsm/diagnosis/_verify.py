@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..records import Record, fingerprint
+from ..records import Record, fingerprint, records_of
 from ..reporting import read_diagnosis
 from ..structures import Structure, causes
 from ._diagnose import diagnose
 from ._provenance import computed_with, jfsm_version, key_of, model_fingerprint
-from .evidence.split import records_of
 from .search.steps import Progress
 
 OF_INTERVAL = 0.05

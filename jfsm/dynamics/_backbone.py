@@ -12,7 +12,7 @@ from jaxtyping import Float
 from .._programs import programs_kept
 from .._result import Result
 from .._types import as_array, require_x64
-from ..structures import Structure
+from ..structures import Structure, as_model
 from ._field import Field, autonomous_field
 from ._harmonic_balance import FreeBalance, check_positive, displacement, solve
 from ._linearise import linearise_field
@@ -102,6 +102,7 @@ def backbone(
         oscillate.
     """
     require_x64()
+    as_model(model)
     check_positive(harmonics=harmonics)
     sizes = as_array(amplitudes, "amplitudes", 1)
     if not sizes.size or np.any(np.diff(sizes) <= 0) or sizes[0] <= 0:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float, Inexact
 
 from .._types import as_array, require_x64
-from ..structures import MapTerm, Structure
+from ..structures import MapTerm, Structure, as_model
 from ._field import Field, autonomous_field
 from ._linearise import is_stable, linearise_field, tangent
 from ._scales import scales, spread
@@ -83,8 +83,9 @@ def fixed_points(
         or an argument has the wrong form.
     """
     require_x64()
-    if starts < 1:
-        raise ValueError(f"`starts` must be 1 or more; got {starts}.")
+    as_model(model)
+    if not isinstance(starts, int) or starts < 1:
+        raise ValueError(f"`starts` must be 1 or more, a whole number; got {starts!r}.")
     box = None if within is None else _as_box(within, model.dof)
     system = autonomous_field(with_tables(model), force)
     points, shortest = search(system, model, box, starts)

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from .._programs import programs_kept
 from .._result import Result
 from .._types import require_x64
-from ..structures import Structure
+from ..structures import Structure, as_model
 from ._field import Field, autonomous_field
 from ._harmonic_balance import ForcedBalance, Solved, check_positive, displacement, solve, tables
 from ._linearise import linearise_field
@@ -170,6 +170,7 @@ def forced_response(
     .. [1] T. M. Cameron, J. H. Griffin, J. Appl. Mech. 56 (1989) 149-154.
     """
     require_x64()
+    as_model(model)
     check_positive(harmonics=harmonics, step=step, max_points=max_points, amplitude=amplitude)
     if not 1 <= at <= model.dof:
         raise ValueError(f"`at` must be a degree of freedom from 1 to {model.dof}; got {at}.")

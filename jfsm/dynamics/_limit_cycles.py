@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from .._programs import programs_kept
 from .._types import as_array, require_x64
-from ..structures import Structure
+from ..structures import Structure, as_model
 from ._field import Field, autonomous_field
 from ._fixed_points import search
 from ._linearise import is_stable, linearise_field
@@ -161,6 +161,7 @@ def limit_cycles(model: Structure, starts: Any = None, *, force: Any = None) -> 
     van der Pol oscillator the origin repels and large motions are damped. There is no such theorem beyond the plane.
     """
     require_x64()
+    as_model(model)
     system = autonomous_field(with_tables(model), force)
     size, period = _sizes(system, model)
     rest = _points_of_rest(system, model, size)

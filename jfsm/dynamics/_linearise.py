@@ -11,7 +11,7 @@ from jaxtyping import Array, Float, Inexact
 
 from .._types import as_array, require_x64
 from ..plant import state_matrix
-from ..structures import Structure
+from ..structures import Structure, as_model
 from ._field import Field, autonomous_field
 
 
@@ -72,6 +72,7 @@ def linearise(model: Structure, state: Any = None) -> Linearisation:
     the paper's eq. 73. At a corner of a piecewise force the slope is that of one of its sides.
     """
     require_x64()
+    as_model(model)
     at = np.zeros(2 * model.dof) if state is None else as_array(state, "state", 1)
     if at.shape != (2 * model.dof,):
         raise ValueError(

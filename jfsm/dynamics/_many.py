@@ -1,7 +1,8 @@
 """Many free runs in one call: other numbers, other starts, the same laws."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from os import PathLike
 from typing import Any
 
 import equinox as eqx
@@ -21,6 +22,7 @@ from ..plant import (
     alone,
     bucket,
     check_pair,
+    check_reconstruction,
     excitation,
     force_limits,
     free_run,
@@ -32,8 +34,8 @@ from ..plant import (
     substeps_for,
     typical_size,
 )
-from ..records import Record
-from ..structures import MapTerm, Structure, check_order
+from ..records import Record, as_record
+from ..structures import MapTerm, Structure, as_model, check_order
 from ._simulate import escapes, finer, motion_bound, with_tables
 
 _LANES = (1, 8, 64)
@@ -98,7 +100,10 @@ def simulate_many(
     """
     require_x64()
     check_order("jfsm.simulate_many(models, record)", models, record)
-    structures = [models] if isinstance(models, Structure) else list(models)
+    as_record(record)
+    check_reconstruction(reconstruction)
+    given = [models] if isinstance(models, Structure | str | PathLike) or not isinstance(models, Iterable) else models
+    structures = [as_model(model, "models") for model in given]
     if not structures:
         raise ValueError("`models` must hold at least one structure; the sequence is empty.")
     for structure in structures:
@@ -108,8 +113,8 @@ def simulate_many(
             "`models` must differ in their numbers only: the same laws and sensor effects at the same places, in the "
             "same order, with the same maps and the same limits of a clipped force."
         )
-    if substeps is not None and substeps < 1:
-        raise ValueError(f"`substeps` must be at least 1; got {substeps}.")
+    if substeps is not None and not (isinstance(substeps, int) and substeps >= 1):
+        raise ValueError(f"`substeps` must be at least 1, a whole number; got {substeps!r}.")
     dof = structures[0].dof
     x0, v0 = (np.zeros((1, dof)), np.zeros((1, dof))) if initial_states is None else _states(initial_states, dof)
     runs = max(len(structures), len(x0))

@@ -22,6 +22,8 @@ from ..plant import (
     alone,
     bucket,
     check_pair,
+    check_reconstruction,
+    check_window,
     excitation,
     force_limits,
     force_needed,
@@ -42,7 +44,7 @@ from ..plant import (
     typical_size,
     undelayed,
 )
-from ..records import Record, mended
+from ..records import Record, as_record, mended
 from ..structures import (
     AbstractFriction,
     AbstractSensor,
@@ -56,6 +58,7 @@ from ..structures import (
     MapTerm,
     Offset,
     Structure,
+    as_model,
     check_order,
 )
 from ..surrogates import AbstractForceStateMap, tabulate
@@ -287,7 +290,11 @@ def simulate(
     """
     require_x64()
     check_order("jfsm.simulate(model, record)", model, record)
+    as_model(model)
+    as_record(record)
     check_scheme(solver, tolerance)
+    check_reconstruction(reconstruction)
+    check_window(window)
     check_pair(model, record, imposed=True)
     record = mended(record)
     model = with_tables(model)
@@ -476,7 +483,7 @@ def _by_dof(force: Any, record: Record, dof: int) -> Any:
 
 def check_scheme(solver: Any, tolerance: Any) -> None:
     """Refuse a solver that there is not, or a tolerance that step control cannot keep."""
-    if solver not in get_args(Solver):
+    if not isinstance(solver, str) or solver not in get_args(Solver):
         raise ValueError(f'`solver` must be "reference" or "grid"; got {solver!r}. Leave it out for "reference".')
     number = isinstance(tolerance, int | float | np.number) and not isinstance(tolerance, bool)
     if not number or not _TIGHTEST <= tolerance <= _LOOSEST:

@@ -17,8 +17,8 @@ from .._programs import programs_kept
 from .._threads import small_matrices
 from .._types import require_x64
 from ..plant import check_pair, direction, lower
-from ..records import Record, mended
-from ..structures import LinearDamping, LinearStiffness, Structure, check_order
+from ..records import Record, as_record, mended
+from ..structures import LinearDamping, LinearStiffness, Structure, as_model, check_order, check_places
 from ._learning import Learned, learned, smoothed
 from ._missing import less_known
 from ._observable import Place, require_apart, require_seen
@@ -129,6 +129,9 @@ def estimate_motion(
     """
     require_x64()
     check_order("jfsm.estimate_motion(record, model)", model, record)
+    as_record(record)
+    if model is not None:
+        as_model(model)
     if not record.responses:
         raise ValueError(
             "`record` must hold a response (displacement, velocity or acceleration); it has none to start from."
@@ -238,13 +241,8 @@ def _with_model(record: Record, model: Structure, places: Sequence[Place] | None
 
 def _links(model: Structure, places: Sequence[Place]) -> tuple[Place, ...]:
     """The places, and the links of laws that the linear part of the model does not have."""
+    check_places(places, model.dof)
     given: list[Any] = [tuple(at) for at in places]
-    for at in given:
-        if len(at) != 2 or at[0] == at[1] or not all(isinstance(j, int) and 0 <= j <= model.dof for j in at):
-            raise ValueError(
-                f"`places` must be links (i, j) between two of ground (0) and the degrees of freedom 1 to {model.dof}; "
-                f"one is {at}. A load on degree of freedom j is at (0, j)."
-            )
     if not given:
         raise ValueError("`places` must name at least one link; it is empty. Leave it out for all degrees of freedom.")
     laws: list[Any] = [term.at for term in model.terms if not isinstance(term, LinearStiffness | LinearDamping)]

@@ -9,8 +9,8 @@ from jaxtyping import Float
 from .._programs import programs_kept
 from .._types import as_scalar, require_x64
 from ..plant import direction
-from ..records import Record, mended
-from ..structures import Structure
+from ..records import Record, as_record, mended
+from ..structures import Structure, as_model, check_places
 from ._motion import estimate_motion
 from ._observable import Place
 
@@ -77,11 +77,13 @@ def restoring_force(
             "`model` or `mass` must be given, and not both: a force is g - m a. Give the mass for all of the link's "
             "force, or the model for what it lacks."
         )
-    record = mended(record)
+    record = mended(as_record(record))
     if model is None:
         return _whole(record, mass, at)
-    if at is None:
-        if model.dof > 1:
+    if at is not None:
+        check_places([at], as_model(model).dof)
+    else:
+        if as_model(model).dof > 1:
             links = ", ".join(map(str, model.links))
             raise ValueError(f"`at` must name a link where the model has several degrees of freedom; it has {links}.")
         at = (0, 1)

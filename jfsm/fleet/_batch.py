@@ -1,12 +1,12 @@
 """The outcome of a batch, as a value."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
+from .._files import parsed_json
 from ..diagnosis import Diagnosis
 from ..records import OutUnits, out_units
 from ..reporting import print_batch, shown_in
@@ -80,7 +80,7 @@ class Batch:
             If it is none.
         """
         path = Path(folder) / "summary.json"
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = parsed_json(path.read_bytes())
         if not isinstance(found, dict) or "clusters" not in found:
             raise ValueError(f"{path} must be the summary of a batch; it is another file.")
         return cls(str(folder), found)

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from filelock import FileLock, Timeout
 
+from .._files import parsed_json
 from ..reporting import render_page, write_atomically
 from ._outcome import Failure
 
@@ -172,8 +173,8 @@ def _stamped(path: Path, stamp: Stamp) -> dict[str, Any] | None:
 def _loaded(path: Path) -> dict[str, Any] | None:
     """The dictionary in a file; None where there is none."""
     try:
-        found = json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError):
+        found = parsed_json(path.read_bytes())
+    except (OSError, ValueError):
         return None
     return found if isinstance(found, dict) else None
 

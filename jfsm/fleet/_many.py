@@ -7,16 +7,16 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, as_completed
 from contextlib import closing, contextmanager
 from os import PathLike, fspath
-from pathlib import Path
 from typing import Any, Unpack, cast
 
+from .._files import as_path
 from .._processes import DiedError, in_processes
 from .._programs import programs_kept
 from .._types import require_x64
 from ..diagnosis import jfsm_version, model_fingerprint
 from ..records import Record
 from ..reporting import shown_by_default
-from ..structures import Runs, Structure
+from ..structures import MODEL, Runs, Structure, check_order, remedy
 from ._batch import Batch
 from ._folder import Folder, Stamp, Standing
 from ._options import Options, Settings, sorted_options
@@ -88,6 +88,7 @@ def diagnose_many(
     ... )  # doctest: +SKIP
     >>> batch.print()  # doctest: +SKIP
     """
+    check_order("jfsm.diagnose_many(records, model, out)", model, records)
     reading, settings = sorted_options(options)
     return many(sources_of(records, reading), model, out, executor, settings, progress)
 
@@ -103,11 +104,9 @@ def many(
     """What `diagnose_many` does, of sources whose ways to be read may differ."""
     require_x64()
     if not isinstance(model, Structure | Runs):
-        raise TypeError(
-            f"`model` must be a structure, such as jfsm.Structure.sdof(1.0, 9.0, 0.1), or a simulation; got {model!r}."
-        )
+        raise TypeError(f"`model` must be {MODEL}; got {model!r}.{remedy(model)}")
     runner = _runner(executor, model)
-    folder = Folder(fspath(Path(out).absolute()))
+    folder = Folder(fspath(as_path(out, "out").absolute()))
     common = (model_fingerprint(model), settings.fingerprint, jfsm_version())
     with folder.held(), shown_by_default(progress) as told, _interrupted_at_once():
         rows, tasks = dict[str, Row](), list[Task]()

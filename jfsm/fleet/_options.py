@@ -8,11 +8,11 @@ from typing import Any, TypedDict
 
 import jax
 
-from ..diagnosis import key_of, plain_input, plain_key, plain_settings
+from ..diagnosis import check_settings, held_records, key_of, plain_input, plain_key, plain_settings
 from ..plant import Reconstruction
-from ..records import READ, Reading, Record
+from ..records import READ, Reading, Record, as_instant
 from ..records.formats.lookup import ChannelName
-from ..structures import Cause
+from ..structures import Cause, check_places
 
 
 class Options(TypedDict, total=False):
@@ -60,6 +60,12 @@ class Settings(dict[str, Any]):
     def of(cls, **options: Any) -> "Settings":
         """Those that are given, and the defaults of `diagnose` for the others."""
         settings = cls({name: options.get(name, default) for name, default in _DEFAULTS.items()})
+        check_settings(*(settings[name] for name in ("causes", "max_causes", "key", "reconstruction", "time_limit")))
+        held_records(settings["holdout"])
+        check_places(settings["places"])
+        for name in ("since", "until"):
+            if settings[name] is not None:
+                as_instant(name, settings[name])
         if settings["key"] is not None:
             settings["key"] = plain_key(settings["key"])
         return settings

@@ -1,7 +1,7 @@
 """Values of a structure's own numbers from records."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,9 +12,9 @@ from .._programs import programs_kept
 from .._result import Result
 from .._threads import side_by_side, small_matrices
 from .._types import require_x64
-from ..plant import Reconstruction
-from ..records import Record, mended
-from ..structures import Offset, Structure, check_order, is_offset
+from ..plant import Reconstruction, check_reconstruction
+from ..records import Record, check_together, mended, records_of
+from ..structures import Offset, Structure, as_model, check_order, is_offset
 from ._maximise import Maximum, approach, finish
 from ._missing_links import missing_links, words_of
 from ._modes import Mode, modes_of
@@ -155,10 +155,12 @@ def fit(
     """
     require_x64()
     check_order("jfsm.fit(model, record)", model, record)
-    records = [record] if isinstance(record, Record) else list(record)
-    if not records:
-        raise ValueError("`record` must hold at least one record; the sequence is empty.")
-    records = [mended(part.between(since, until)) for part in records]
+    as_model(model)
+    check_reconstruction(reconstruction)
+    check_names(model, fixed, bounds)
+    records = [part.between(since, until) for part in records_of(record)]
+    check_together(records)
+    records = [mended(part) for part in records]
     prepared = prepare_all(records, model, reconstruction)
     free = free_paths(model, prepared, fixed)
     held = {path: value for path, value in model.values().items() if path not in free}
@@ -188,6 +190,34 @@ def fit(
     modes = modes_of(structure, unknowns, theta, covariance)
     value, result = -float(best.value[lane]), best.results[lane]
     return Fit(kept, values, intervals, pairs, words, value, noise, result, missing, modes)
+
+
+def check_names(model: Structure, fixed: Any, bounds: Any) -> None:
+    """Refuse what stays and what is bounded where that means no number of the structure, or no interval.
+
+    Raises
+    ------
+    TypeError, ValueError
+        It names the argument.
+    """
+    if not isinstance(fixed, Iterable) or isinstance(fixed, np.ndarray):
+        raise TypeError(f'`fixed` must be names, as ("mass", "stiffness@0-1.k"); got {fixed!r}.')
+    if bounds is not None and not isinstance(bounds, Mapping):
+        raise TypeError(f'`bounds` must be intervals by name, as {{"mass": (0.9, 1.1)}}; got {bounds!r}.')
+    named = [("fixed", name) for name in ([fixed] if isinstance(fixed, str) else fixed)]
+    for argument, name in [*named, *(("bounds", name) for name in bounds or {})]:
+        if not isinstance(name, str) or not model.select(name):
+            raise ValueError(
+                f"`{argument}` names {name!r}, which the structure does not have; it has {', '.join(model.values())}."
+            )
+    for name, ends in (bounds or {}).items():
+        try:
+            low, high = map(float, ends)
+        except (TypeError, ValueError):
+            low = high = math.nan
+        if not low < high:
+            given = f"({', '.join(map(str, ends))})" if isinstance(ends, tuple | list) else repr(ends)
+            raise ValueError(f"`bounds` of {name!r} must be (low, high) with low < high; got {given}.")
 
 
 def sandwich(
@@ -251,12 +281,7 @@ def free_paths(model: Structure, records: Sequence[Nuisances], fixed: Sequence[s
     """Paths that a fit may change; masses stay where no force gives the scale, or no inertia shows."""
     held: set[str] = set()
     for name in [fixed] if isinstance(fixed, str) else fixed:
-        paths = model.select(name)
-        if not paths:
-            raise ValueError(
-                f"`fixed` names {name!r}, which the structure does not have; it has {', '.join(model.values())}."
-            )
-        held.update(paths)
+        held.update(model.select(name))
     if not any(n.weighs(model) for n in records):
         held.update(model.select("mass"))
     return tuple(p for p, (what, _) in model.entries().items() if p not in held and what.free and not is_offset(p))
@@ -298,12 +323,6 @@ def _scales(unknowns: Sequence[Unknown], theta: np.ndarray) -> list[float]:
 def _bounded(unknowns: list[Unknown], bounds: Mapping[str, tuple[float, float]], model: Structure) -> list[Unknown]:
     for name, (low, high) in bounds.items():
         paths = model.select(name)
-        if not paths:
-            raise ValueError(
-                f"`bounds` names {name!r}, which the structure does not have; it has {', '.join(model.values())}."
-            )
-        if not low < high:
-            raise ValueError(f"`bounds` of {name!r} must be (low, high) with low < high; got ({low}, {high}).")
         unknowns = [untied(u, model) if u.path in paths else u for u in unknowns]
         for unknown in unknowns:
             if unknown.path in paths and unknown.log and not max(low / unknown.unit, high / unknown.unit) > 0:

@@ -45,12 +45,12 @@ def check_method(method: str, mass: float | None, order: int | None) -> None:
     ValueError
         If there is no such method, it needs a mass, or the order is too low for it.
     """
-    if method not in ("rkpm", "kriging", "joint"):
+    if not isinstance(method, str) or method not in ("rkpm", "kriging", "joint"):
         raise ValueError(f'`method` must be "rkpm", "kriging" or "joint"; got {method!r}.')
     if method == "joint" and mass is None:
         raise ValueError('`method="joint"` maps all of the force on a single mass: give `mass`, and no model.')
     least = 1 if method == "rkpm" else 0
-    if order is not None and order < least:
+    if order is not None and not (isinstance(order, int | np.integer) and order >= least):
         raise ValueError(f"`order` must be an integer of {least} or more; got {order!r}.")
 
 

@@ -12,7 +12,7 @@ from .._programs import programs_kept
 from .._result import Estimate
 from .._types import evenly_taken
 from ..estimation import RestoringForce, restoring_force
-from ..records import OutUnits, Record, out_units
+from ..records import OutUnits, Record, as_record, out_units
 from ..structures import Parameter, Structure, check_order
 from ..surrogates import RKPM, Discontinuity, Kriging, find_discontinuities
 from .learned_map import LearnedMap, check_method, learn
@@ -135,6 +135,7 @@ def map_force(
     All this is of maps that are learned after the motion, not together with it.
     """
     check_order("jfsm.map_force(record, model)", model, record)
+    as_record(record)
     check_method(method, mass, order)
     readings = restoring_force(record, model, mass, at)
     known = np.flatnonzero(readings.std <= _UNSURE * np.median(readings.std))

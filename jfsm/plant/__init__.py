@@ -11,6 +11,7 @@ from ._along import force_along as force_along
 from ._by_itself import run_by_itself as run_by_itself
 from ._course import Course as Course
 from ._drive import Reconstruction as Reconstruction
+from ._drive import check_reconstruction as check_reconstruction
 from ._excitation import Swing as Swing
 from ._excitation import bucket as bucket
 from ._excitation import excitation as excitation
@@ -67,6 +68,7 @@ from ._plant import lower as lower
 from ._plant import numbers_of as numbers_of
 from ._plant import observation_of as observation_of
 from ._plant import state_matrix as state_matrix
+from ._start import check_window as check_window
 from ._start import starting_state as starting_state
 from ._stepper import Load as Load
 from ._stepper import Motion as Motion

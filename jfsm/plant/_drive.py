@@ -15,6 +15,18 @@ _KAISER_BETA = 14.0
 """Stop band near -140 dB, flat up to 0.43 of the sample rate; a force above that is taken to move nothing."""
 
 
+def check_reconstruction(method: Any) -> None:
+    """Refuse what is no way for a force to go between its samples.
+
+    Raises
+    ------
+    ValueError
+        With the ways that there are.
+    """
+    if not isinstance(method, str) or method not in get_args(Reconstruction):
+        raise ValueError(f'`reconstruction` must be "band-limited", "linear" or "hold"; got {method!r}.')
+
+
 def reconstruct(samples: Any, factor: int, method: Reconstruction = "band-limited") -> Any:
     """Values at `factor` equal steps per sample, ``(n - 1) * factor + 1`` in all, from samples (n, dof).
 
@@ -25,8 +37,7 @@ def reconstruct(samples: Any, factor: int, method: Reconstruction = "band-limite
     made that way. On a resonance with nine samples a period the choice is worth a factor of three in the error of a
     simulation, so it is the drive's, never the solver's.
     """
-    if method not in get_args(Reconstruction):
-        raise ValueError(f'`reconstruction` must be "band-limited", "linear" or "hold"; got {method!r}.')
+    check_reconstruction(method)
     n, xp = samples.shape[0], jnp if is_traced(samples) else np
     if factor == 1:
         return xp.array(samples)

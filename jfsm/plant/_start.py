@@ -63,6 +63,18 @@ def starting_state(
     return _least_squares(model, record[: min(window, len(record))], reconstruction)
 
 
+def check_window(window: Any) -> None:
+    """Refuse what is no number of samples to find a start from.
+
+    Raises
+    ------
+    ValueError
+        With what it was.
+    """
+    if not isinstance(window, int | np.integer) or isinstance(window, bool) or window < 2:
+        raise ValueError(f"`window` must be a whole number of samples from 2 on; got {window!r}. Leave it out for 50.")
+
+
 def _least_squares(model: Structure, head: Record, reconstruction: Reconstruction) -> tuple[np.ndarray, np.ndarray]:
     channels = tuple(head.responses)
     y = np.column_stack([head.responses[c] for c in channels])

@@ -1,6 +1,7 @@
 """What was measured: records, their files, their units and their noise."""
 
 from jfsm.records._advance import advanced as advanced
+from jfsm.records._channels import as_instant as as_instant
 from jfsm.records._checks import strongest_frequency as strongest_frequency
 from jfsm.records._combine import align as align
 from jfsm.records._combine import join as join
@@ -11,6 +12,11 @@ from jfsm.records._defects import defects as defects
 from jfsm.records._defects import spikes as spikes
 from jfsm.records._fingerprint import file_fingerprint as file_fingerprint
 from jfsm.records._fingerprint import fingerprint as fingerprint
+from jfsm.records._given import as_record as as_record
+from jfsm.records._given import check_together as check_together
+from jfsm.records._given import records_of as records_of
+from jfsm.records._given import require_one_unit as require_one_unit
+from jfsm.records._given import shared_readings as shared_readings
 from jfsm.records._listing import Listing as Listing
 from jfsm.records._listing import listing as listing
 from jfsm.records._look import LOOKS as LOOKS
@@ -39,3 +45,4 @@ from jfsm.records._unit_factors import UnitFactor as UnitFactor
 from jfsm.records._unit_factors import likely_unit as likely_unit
 from jfsm.records._unit_factors import miss as miss
 from jfsm.records._units import find_unit as find_unit
+from jfsm.records.formats import format_to_write as format_to_write

@@ -8,7 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from jfsm.records._advance import advanced
-from jfsm.records._channels import Columns, as_columns, as_single, as_time, frozen
+from jfsm.records._channels import (
+    Columns,
+    as_columns,
+    as_instant,
+    as_single,
+    as_time,
+    frozen,
+    require_mapping,
+)
 from jfsm.records._resample import long_gaps, resampled
 from jfsm.records._units import KINDS, coherent_units, find_unit
 
@@ -42,8 +50,9 @@ class AbstractRecord:
         drive: Drive = "force",
         name: str | None = None,
     ):
-        if drive not in ("force", "motion"):
+        if not isinstance(drive, str) or drive not in ("force", "motion"):
             raise ValueError(f'`drive` must be "force" or "motion"; it was {drive!r}. Say which of them is imposed.')
+        require_mapping("units", units, "{'force': 'kN'}")
         for kind in units or {}:
             if kind not in ("time", *KINDS):
                 raise ValueError(f"`units` must be given by kind, one of time, {', '.join(KINDS)}; it names {kind!r}.")
@@ -63,6 +72,10 @@ class AbstractRecord:
         if base_acceleration is not None:
             factor = factors.get("base_acceleration", 1.0)
             self._base_acceleration = as_single("base_acceleration", base_acceleration, self._time, factor)
+        if not isinstance(at_rest, bool | np.bool_):
+            raise TypeError(f"`at_rest` must be True or False; it was {at_rest!r}.")
+        if name is not None and not isinstance(name, str):
+            raise TypeError(f"`name` must be a text; it was {name!r}.")
         self._at_rest = bool(at_rest)
         self._drive: Drive = drive
         self._name = name
@@ -260,11 +273,11 @@ class AbstractRecord:
 
     def until(self, time: float) -> Self:
         """The part up to and including this instant [s]; notes and errors as of a slice."""
-        return self[: int(np.searchsorted(self._time, time, side="right"))]
+        return self[: int(np.searchsorted(self._time, as_instant("time", time), side="right"))]
 
     def since(self, time: float) -> Self:
         """The part from this instant [s] on, itself included; notes and errors as of a slice."""
-        return self[int(np.searchsorted(self._time, time, side="left")) :]
+        return self[int(np.searchsorted(self._time, as_instant("time", time), side="left")) :]
 
     def between(self, since: float | None = None, until: float | None = None) -> Self:
         """The part from one instant [s] to another, both included, or from the beginning, or to the end.
@@ -276,8 +289,10 @@ class AbstractRecord:
         """
         if since is None and until is None:
             return self
-        first = 0 if since is None else int(np.searchsorted(self._time, since, side="left"))
-        last = len(self) if until is None else int(np.searchsorted(self._time, until, side="right"))
+        first = 0 if since is None else int(np.searchsorted(self._time, as_instant("since", since), side="left"))
+        last = (
+            len(self) if until is None else int(np.searchsorted(self._time, as_instant("until", until), side="right"))
+        )
         if last - first < 2:
             raise ValueError(
                 f"`since` and `until` must keep at least 2 samples of a record from {self._time[0]:.6g} to "
@@ -295,7 +310,7 @@ class AbstractRecord:
         ValueError
             If `seconds` is not finite.
         """
-        if not np.isfinite(seconds):
+        if not np.isfinite(as_instant("seconds", seconds)):
             raise ValueError(f"`seconds` must be a finite time; it was {seconds}. Pass seconds, as 0.0125.")
         other = self._with(frozen(self._time + seconds), self._columns, self._base_acceleration, at_rest=self._at_rest)
         return other.noted(f"The clock was put {'forward' if seconds >= 0 else 'back'} by {abs(seconds):.9g} s.")
@@ -360,7 +375,7 @@ class AbstractRecord:
         ValueError
             If `rate` is not positive, or leaves fewer than two samples.
         """
-        other, note = self._resampled(rate)
+        other, note = self._resampled(as_instant("rate", rate))
         return other.noted(note)
 
     def noted(self, *notes: str) -> Self:

@@ -1,12 +1,15 @@
 """What a record is given, checked and brought into one shape: columns of finite doubles, one for each measured dof."""
 
 from collections.abc import Mapping
+from numbers import Real
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Samples = TypeVar("Samples", NDArray[np.float64], NDArray[np.bool_])
+MOST_DOFS = 10_000
+"""More than anyone measures; a number in the place of a name counts as one otherwise."""
 Columns = tuple[tuple[int, ...], NDArray[np.float64]]
 
 
@@ -40,6 +43,33 @@ def as_time(time: Any, factor: float) -> NDArray[np.float64]:
     return frozen(clock)
 
 
+def as_instant(name: str, given: Any) -> float:
+    """One number, of seconds or per second, as a float.
+
+    Raises
+    ------
+    TypeError
+        If it is none.
+    """
+    if isinstance(given, Real | np.number) and not isinstance(given, bool):
+        return float(given)
+    if isinstance(given, np.ndarray) and given.ndim == 0 and given.dtype.kind in "iuf":
+        return float(given)
+    raise TypeError(f"`{name}` must be one number; it was {given!r}.")
+
+
+def require_mapping(name: str, given: Any, example: str) -> None:
+    """Refuse what says nothing by name; None says nothing.
+
+    Raises
+    ------
+    TypeError
+        With an example.
+    """
+    if given is not None and not isinstance(given, Mapping):
+        raise TypeError(f"`{name}` must be given by name, as {example}; it was {given!r}.")
+
+
 def as_columns(kind: str, given: Any, time: NDArray[np.float64], factor: float) -> Columns:
     """The dofs that a channel argument mentions, ascending, and their samples, (n, dofs) in the coherent unit.
 
@@ -58,6 +88,11 @@ def as_columns(kind: str, given: Any, time: NDArray[np.float64], factor: float) 
                 )
             if dof < 1:
                 raise ValueError(f"`{kind}` given by dof counts from 1 (0 is ground); one key is {dof}. Number from 1.")
+            if dof > MOST_DOFS:
+                raise ValueError(
+                    f"`{kind}` given by dof counts degrees of freedom, {MOST_DOFS} at most; one key is {dof}. Number "
+                    "them from 1 on, without gaps."
+                )
         dofs = tuple(sorted(int(dof) for dof in given))
         samples = np.empty((time.size, len(dofs)), order="F")
         for place, dof in enumerate(dofs):
@@ -102,6 +137,8 @@ def _real(name: str, given: Any) -> NDArray[np.float64]:
     """A copy in double precision; masked samples become NaN, so that they are refused with the others."""
     try:
         array = np.ma.asanyarray(given) if isinstance(given, np.ma.MaskedArray) else np.asarray(given)
+    except TypeError:  # of things that only look like a sequence
+        raise TypeError(f"`{name}` must hold real numbers; it was {given!r}. Pass an array.") from None
     except ValueError as error:
         raise ValueError(f"`{name}` must be a rectangular array: {error}. Pass columns of equal length.") from None
     if array.dtype.kind not in "iuf":

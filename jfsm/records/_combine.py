@@ -1,6 +1,6 @@
 """Several records made into one: pieces one after another, or channels side by side."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -144,6 +144,8 @@ def _on_one_clock(records: list[Record]) -> tuple[list[Record], list[str]]:
 
 
 def _several(records: Any) -> list[Record]:
+    if not isinstance(records, Record | Iterable):
+        raise TypeError(f"`records` must be a list of records; got {records!r}.")
     given = [records] if isinstance(records, Record) else list(records)
     for item in given:
         if not isinstance(item, Record):

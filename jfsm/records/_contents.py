@@ -2,13 +2,14 @@
 
 import contextlib
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from jfsm.records._abstract_record import AbstractRecord, AnyRecord, Drive
+from jfsm.records._channels import require_mapping
 from jfsm.records._repeats import repetition
 from jfsm.records._units import KINDS, find_sensitivity, find_unit
 from jfsm.records.formats.base import Contents, point_name
@@ -72,6 +73,7 @@ def record_of(
 
     Errors are those of `read`.
     """
+    _require_words(asked)
     chosen = {kind: _by_dof(contents, source, kind, names) for kind, names in _names(contents, source, asked).items()}
     every = [choice for choices in chosen.values() for choice in choices.values()]
     units, sensitivity = asked.units or {}, asked.sensitivity or {}
@@ -210,9 +212,22 @@ def _held(source: str, samples: Mapping[str, Any]) -> list[str]:
     ]
 
 
+def _require_words(asked: Asked) -> None:
+    """Refuse what is no name where one is asked for."""
+    require_mapping("units", asked.units, "{'F': 'kN'}")
+    require_mapping("sensitivity", asked.sensitivity, "{'a1': '100 mV/g'}")
+    for name, given in (("time", asked.time), ("base_acceleration", asked.wanted[-1])):
+        if given is not None and not isinstance(given, str):
+            raise TypeError(f"`{name}` must be the name of a channel; got {given!r}.")
+
+
 def _by_dof(contents: Contents, source: str, kind: str, names: ChannelName) -> dict[int | None, Choice]:
     """What was asked for by dof, under None where one name stands for all of a kind."""
     by_dof: Mapping[Any, str]
+    given = [names] if isinstance(names, str) else names.values() if isinstance(names, Mapping) else names
+    listed = isinstance(given, Iterable) and not hasattr(given, "dtype") and all(isinstance(n, str) for n in given)
+    if given is not None and not listed:
+        raise TypeError(f"`{kind}` must be the name of a channel, a list of names, or names by dof; got {names!r}.")
     if isinstance(names, str):
         by_dof = {None: names}
     elif isinstance(names, Mapping):
@@ -248,7 +263,8 @@ def _require_raw(choice: Choice, unit: str | None, written: str, reading: str) -
 def _unit(contents: Contents, source: str, choice: Choice, units: Mapping[str, str]) -> str | None:
     """Unit of a channel, from what the caller says and else from what the file states."""
     given = _said(units, choice)
-    stated = contents.units.get(choice.array)
+    of_column = None if choice.column is None else contents.units.get(f"{choice.array}[{choice.column}]")
+    stated = of_column or contents.units.get(choice.array)
     if given is not None or stated is None:
         return given
     try:

@@ -15,11 +15,12 @@ from jfsm.records._checks import ChannelSummary, Finding, examine
 from jfsm.records._coherence import Coherence, coherence
 from jfsm.records._comparison import Comparison, Reading
 from jfsm.records._consistency import KINDS, comparisons, of_comparisons
+from jfsm.records._defects import bridged, spikes
 from jfsm.records._figures import capitalised, plus_minus
 from jfsm.records._look import look
 from jfsm.records._loudest import loudest_part
 from jfsm.records._mended import mended
-from jfsm.records._noise_floor import SHORTEST, noise_floor
+from jfsm.records._noise_floor import SHORTEST, NoiseFloor, noise_floor
 from jfsm.records._noise_spectrum import NoiseSpectrum, noise_spectrum
 from jfsm.records._out_units import OutUnits, out_units
 from jfsm.records._periods import Periods, average
@@ -157,7 +158,7 @@ def inspect(record: AbstractRecord) -> Inspection:
     pushing = [y for name, (_, y) in even.items() if name.startswith(("force", "base")) and record.drive == "force"]
     for channel, (unit, samples) in _every_channel(record).items():
         y = even[channel][1]
-        floor = noise_floor(y, dt) if y.size >= SHORTEST else None
+        floor = _floor(y, dt)
         traces.append(Trace.of(channel, unit, samples, floor))
         turning = _turning(record, channel) if channel.startswith("acceleration") else None
         pushed_by = pushing if channel.startswith("displacement") else ()
@@ -250,6 +251,14 @@ def _of_the_part(part: AbstractRecord, samples: int) -> Finding:
         f"loudest, t = {part.time[0]:.6g} to {part.time[-1]:.6g} s; extremes, gaps and lost samples those of all."
     )
     return Finding("info", "record", message)
+
+
+def _floor(y: NDArray[np.float64], dt: float) -> NoiseFloor | None:
+    """The noise floor of a channel; where spikes hide its signal, that of the channel without them."""
+    if y.size < SHORTEST:
+        return None
+    floor = noise_floor(y, dt)
+    return noise_floor(bridged(y, spikes(y, floor.std)), dt) if floor.silent else floor
 
 
 def _turning(record: AbstractRecord, acceleration: str) -> np.ndarray | None:

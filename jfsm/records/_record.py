@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Self
 
+from jfsm._files import as_path
 from jfsm.records._abstract_record import AbstractRecord, Drive
 from jfsm.records._contents import Asked, contents_of, record_of
 from jfsm.records._fold import fold
@@ -111,7 +112,7 @@ class Record(AbstractRecord):
         ValueError
             If the suffix is not one of those that can be written.
         """
-        write(self, Path(path))
+        write(self, as_path(path))
 
     @classmethod
     def from_sep005(

@@ -14,6 +14,7 @@ CLOSE = 0.1  # samples nearer than this share of the median step are one reading
 GAP = 3.5  # median steps without a sample from which on nothing is known between: more than two are missing
 HAIR = 1e-6  # of a sample, that rounding makes of none
 ROUNDED = 0.25  # share of a step up to which the digits of a time stamp may be missing
+MOST = 1e8  # samples of a record
 MEMORY, FITTED = 48, 1024  # order of the prediction beyond the ends, and samples it is learnt from
 BATCH = 1 << 20  # products held at once
 
@@ -35,6 +36,11 @@ def resampled(
         raise ValueError(
             f"`rate` must be a positive number of samples per second with at least two of them in {duration:.6g} s; "
             f"it was {rate}. Pass at least {1 / duration:.6g}."
+        )
+    if duration * rate > MOST:
+        raise ValueError(
+            f"`rate` must leave at most {MOST:.0e} samples; {rate:.6g} Hz makes {duration * rate:.3g}. "
+            "Pass a lower rate, in samples per second."
         )
     note = f"Resampled from {(time.size - 1) / (time[-1] - time[0]):.6g} to {rate:.6g} Hz"
     if uneven and (resolution := _rounding(time)):

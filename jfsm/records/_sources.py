@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from jfsm.records._abstract_record import AnyRecord
+from jfsm.records._channels import require_mapping
 from jfsm.records._contents import Asked, record_of
 from jfsm.records.formats import format_of
 from jfsm.records.formats.base import Contents
@@ -20,6 +21,10 @@ def record_from(
     make: type[AnyRecord], source: Any, asked: Asked, where: Mapping[str, str | float] | None = None, sheet: Run = None
 ) -> AnyRecord:
     """A `make`, the class of the record, from whatever holds its channels; errors are those of `read`."""
+    for name, which in (("run", asked.run), ("sheet", sheet)):
+        if which is not None and not isinstance(which, int | str):
+            raise TypeError(f"`{name}` must be a number from 1 on, or a title; got {which!r}.")
+    require_mapping("where", where, "{'run': 3}")
     contents, called, default_name = opened(source)
     contents, run = chosen_run(contents, called, asked.run, sheet)
     return record_of(

@@ -6,7 +6,7 @@ from urllib.parse import quote
 
 from matplotlib.figure import FigureBase
 from matplotlib.ticker import MaxNLocator
-from rich.console import Console, Group
+from rich.console import Group
 from rich.padding import Padding
 from rich.text import Text
 
@@ -17,7 +17,7 @@ from jfsm.reporting._sketch import Sketch, drawn
 from jfsm.reporting._summary import Answer
 from jfsm.reporting._tables import Table
 from jfsm.reporting._template import inline, template
-from jfsm.reporting._text import bullets, rich_table
+from jfsm.reporting._text import bullets, rich_table, terminal
 from jfsm.reporting._wording import VERDICTS, capitalised, cause_name, counted, place_name
 
 Dictionary = Mapping[str, Any]
@@ -70,7 +70,7 @@ def print_batch(d: Dictionary) -> None:
         clusters_table(d["clusters"], len(d["records"])),
         failures_table(d["records"]),
     ]
-    console, changes = Console(), list(change_lines(d))
+    console, changes = terminal(), list(change_lines(d))
     if console.width < WIDE:
         tables[0] = tables[0].only(*ESSENTIAL)
     more = [f"{len(changes) - MOST_LINES} more"] if len(changes) > MOST_LINES else []

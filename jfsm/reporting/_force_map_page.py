@@ -12,7 +12,7 @@ from jfsm.reporting._sketch import Picture, Sketch, drawn
 from jfsm.reporting._summary import Answer
 from jfsm.reporting._tables import Table
 from jfsm.reporting._template import inline, template
-from jfsm.reporting._text import answer_grid, bullets, rich_table
+from jfsm.reporting._text import answer_grid, bullets, rich_table, terminal
 from jfsm.reporting._wording import extent, place_name
 
 Dictionary = Mapping[str, Any]
@@ -57,7 +57,7 @@ def force_map_pictures(d: Dictionary) -> tuple[Picture, ...]:
 def print_force_map(d: Dictionary, console: Console | None = None) -> None:
     """Show in the terminal what is to be known of a force state map, its pictures aside."""
     tables = (_coefficients_table(d), _discontinuities_table(d))
-    (console or Console()).print(
+    (console or terminal()).print(
         Group(
             Text(_headline(d), style="bold"),
             Text(""),

@@ -1,10 +1,10 @@
 """A page made again from the file of its numbers."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+from jfsm._files import as_path, parsed_json
 from jfsm._format import FORMAT
 from jfsm.reporting._inspection_page import render_inspection
 from jfsm.reporting._page import render_page
@@ -52,9 +52,9 @@ def read_diagnosis(path: str | Path) -> dict[str, Any]:
 
 
 def _shown(path: str | Path, show: Callable[[dict[str, Any]], T]) -> T:
-    target = Path(path)
+    target = as_path(path)
     try:
-        d = json.loads(target.read_text(encoding="utf-8"))
+        d = parsed_json(target.read_bytes())
         if not isinstance(d, dict) or not ("verdict" in d or "comparisons" in d):
             raise ValueError("it has no verdict")
         return show(d)

@@ -2,8 +2,9 @@
 
 import io
 import re
+import sys
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from typing import Any, TextIO, cast
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console, Group, RenderableType
@@ -12,6 +13,7 @@ from rich.panel import Panel
 from rich.table import Table as RichTable
 from rich.text import Text
 
+from jfsm._terminal import Spelling
 from jfsm.reporting._inspection_tables import consistency_table, inspected_channels_table, periods_table
 from jfsm.reporting._shown_units import in_shown_words
 from jfsm.reporting._summary import Answer, key_answers
@@ -41,6 +43,11 @@ AGREEMENT = ("channel", "against", "gain", "late by [samples]")
 ESSENTIAL = ("cause", "place", "evidence [nats]", "explains", "probability")
 
 
+def terminal() -> Console:
+    """Standard output; signs that it cannot show are spelt."""
+    return Console(file=cast(TextIO, Spelling(sys.stdout)))
+
+
 def print_diagnosis(d: Mapping[str, Any], console: Console | None = None) -> None:
     """Show a diagnosis in the terminal, in colour where it has any.
 
@@ -56,13 +63,13 @@ def print_diagnosis(d: Mapping[str, Any], console: Console | None = None) -> Non
     ValueError
         If `d` is not the dictionary of a diagnosis.
     """
-    console = console or Console()
+    console = console or terminal()
     console.print(_diagnosis(d, console.width))
 
 
 def print_inspection(d: Mapping[str, Any], console: Console | None = None) -> None:
     """Show in the terminal what ``Inspection.to_dict`` returns: channels, and what is odd about them."""
-    console = console or Console()
+    console = console or terminal()
     console.print(_inspection(d, console.width))
 
 

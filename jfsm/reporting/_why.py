@@ -22,7 +22,7 @@ from jfsm.reporting._checks import (
     stopping_line,
     typeset,
 )
-from jfsm.reporting._text import plain_text
+from jfsm.reporting._text import plain_text, terminal
 
 Dictionary = Mapping[str, Any]
 
@@ -32,7 +32,7 @@ MOST_SHOWN = 4
 
 def print_why(d: Dictionary, cause: str | None = None, console: Console | None = None) -> None:
     """Show in the terminal why the verdict came out, or what became of a cause."""
-    (console or Console()).print(_why(d, cause))
+    (console or terminal()).print(_why(d, cause))
 
 
 def why_text(d: Dictionary, cause: str | None = None, width: int = 100) -> str:

@@ -7,7 +7,12 @@ from ._catalogue import CauseLike as CauseLike
 from ._catalogue import causes as causes
 from ._catalogue import causes_of as causes_of
 from ._definition import own_laws as own_laws
+from ._order import MODEL as MODEL
+from ._order import as_model as as_model
 from ._order import check_order as check_order
+from ._order import check_places as check_places
+from ._order import check_terms as check_terms
+from ._order import remedy as remedy
 from ._own_motion import EvaluatedMotion as EvaluatedMotion
 from ._own_motion import OwnMotion as OwnMotion
 from ._runs import Runs as Runs

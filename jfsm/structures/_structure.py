@@ -60,9 +60,12 @@ class Structure(eqx.Module):
             masses = np.atleast_1d(masses)
             _check_mass(masses)
         self.mass = jnp.atleast_1d(jnp.asarray(masses))
-        self.terms = tuple(terms)
-        self.sensors = tuple(sensors)
-        self.trust = tuple(dict(trust).items())
+        self.terms = _parts(terms, "terms", AbstractTerm)
+        self.sensors = _parts(sensors, "sensors", AbstractSensor)
+        try:
+            self.trust = tuple(dict(trust).items())
+        except (TypeError, ValueError):
+            raise TypeError(f"`trust` must be shares by name, as {{'stiffness': 0.05}}; got {trust!r}.") from None
         self.own, self.own_numbers = None, np.zeros(0)
         for term in self.terms:
             if not isinstance(term, AbstractTerm):
@@ -157,6 +160,8 @@ class Structure(eqx.Module):
         omega = 2 * np.pi * as_array(frequencies, "frequencies", 1)
         ratios = as_array(damping_ratios, "damping_ratios", 1)
         masses = np.ones_like(omega) if modal_masses is None else as_array(modal_masses, "modal_masses", 1)
+        if np.any(omega < 0) or np.any(masses < 0):
+            raise ValueError("`frequencies` and `modal_masses` must not be negative; one of them is.")
         for name, values in (("damping_ratios", ratios), ("shapes", shape), ("modal_masses", masses)):
             if any(size != omega.size for size in values.shape):
                 raise ValueError(f"`{name}` must have {omega.size} modes, as `frequencies` has; got {values.shape}.")
@@ -221,7 +226,7 @@ class Structure(eqx.Module):
     def uncertain(self, **relative: float) -> "Structure":
         """The same structure with stated trust: ``uncertain(stiffness=0.05)`` says stiffnesses are right to 5 %."""
         for name, value in relative.items():
-            if not value > 0:
+            if not _number(name, value) > 0:
                 raise ValueError(f"The uncertainty of `{name}` must be a positive share such as 0.05; got {value!r}.")
             if not self.select(name):
                 raise ValueError(f"`{name}` names no parameter of this structure; it has {', '.join(self.values())}.")
@@ -254,10 +259,13 @@ class Structure(eqx.Module):
 
     def with_values(self, values: Mapping[str, float]) -> "Structure":
         """The same structure with other numbers, by path."""
+        if not isinstance(values, Mapping):
+            raise TypeError(f"`values` must be numbers by path, as {{'mass@1': 2.0}}; got {values!r}.")
         known = self.entries()
         unknown = [path for path in values if path not in known]
         if unknown:
             raise ValueError(f"{unknown[0]!r} names no parameter of this structure; it has {', '.join(known)}.")
+        values = {path: _number(path, value) for path, value in values.items()}
         paths = iter(known)
         own = [values.get(next(paths)) for _ in self._own_entries()]
         parts = []
@@ -265,7 +273,7 @@ class Structure(eqx.Module):
             for parameter in part.parameters:
                 value = values.get(next(paths))
                 if value is not None:
-                    part = replace(part, **{parameter.name: float(value)})  # checked like a new one
+                    part = replace(part, **{parameter.name: value})  # checked like a new one
             parts.append(part)
         n = len(self.terms)
         return self._with_own_values(own, parts[:n], parts[n:])
@@ -318,6 +326,23 @@ class Structure(eqx.Module):
         from ._toml import load
 
         return load(path)
+
+
+def _number(name: str, given: Any) -> float:
+    try:
+        return float("no" if isinstance(given, str) else given)
+    except (TypeError, ValueError):
+        raise TypeError(f"`{name}` must be one number; got {given!r}.") from None
+
+
+def _parts(given: Any, name: str, kind: type) -> tuple[Any, ...]:
+    """Terms or sensor effects in their order, one alone among them."""
+    if isinstance(given, kind):
+        return (given,)
+    try:
+        return tuple(given)
+    except TypeError:
+        raise TypeError(f"`{name}` must be a list; got {given!r}.") from None
 
 
 def _check_mass(mass: np.ndarray) -> None:

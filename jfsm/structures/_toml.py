@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import tomli_w
 
+from .._files import as_path
 from .._map_reader import read_map
 from ..reporting import write_atomically
 from ._definition import own_laws
@@ -34,7 +35,7 @@ def save(structure: "Structure", path: str | Path) -> None:
     ValueError
         If a term holds a map that cannot be written: a function of yours, or one made of such.
     """
-    target = Path(path)
+    target = as_path(path)
     maps: dict[str | os.PathLike[str], bytes] = {}
 
     def beside(term: MapTerm) -> str:
@@ -104,11 +105,11 @@ def load(path: str | Path) -> "Structure":
         If the file is not TOML, lacks `mass`, or holds an unknown kind or parameter, a value that cannot be, or a file
         that is no map; names the entry.
     """
-    target = Path(path)
+    target = as_path(path)
     if not target.is_file():
         raise FileNotFoundError(f"There is no model file {target}; write one with `Structure.save(path)`.")
     try:
-        text = target.read_text(encoding="utf-8")
+        text = target.read_text(encoding="utf-8-sig")  # Windows begins a text with a mark
     except UnicodeDecodeError as error:
         raise ValueError(f"{target} is not a TOML file: {error}.") from None
     return loads(text, target)
@@ -126,7 +127,9 @@ def loads(text: str, target: Path) -> "Structure":
 
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise ValueError(f"{target} is not the TOML file of a model: it is nested too deeply.") from None
+    except ValueError as error:  # of TOML, and of numbers with thousands of digits
         raise ValueError(f"{target} is not a TOML file: {error}.") from None
     unknown = set(data) - {"mass", "term", "sensor", "uncertain"}
     if unknown:

@@ -20,6 +20,7 @@ import numpy as np
 from jaxtyping import jaxtyped
 from numpy.typing import NDArray
 
+from .._files import parsed_json
 from .._types import require_x64
 from ..reporting import write_atomically
 from ._map import AbstractForceStateMap
@@ -124,7 +125,7 @@ def _read(target: Path) -> tuple[Any, dict[str, NDArray[np.float64]]]:
             arrays = {name: archive[name] for name in archive.files}
     if HEADER not in arrays:
         raise ValueError("it says of no map what it is made of")
-    header = json.loads(str(arrays.pop(HEADER)))
+    header = parsed_json(str(arrays.pop(HEADER)))
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise ValueError(f"its format must be {FORMAT!r}")
     return header["map"], arrays

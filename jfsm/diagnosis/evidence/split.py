@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...records import Record, span_of_motion
+from ...records import Record, records_of, span_of_motion
 
 _LATER = "What the model lacks shows in the last part only: that was fitted, and the gain is that of the first part."
 
@@ -37,7 +37,7 @@ def split(
     """
     records = records_of(record)
     if not isinstance(holdout, int | float):
-        whole = [] if holdout is None else _as_list(holdout)
+        whole = [] if holdout is None else records_of(holdout)
         return [(r, span_of_motion(r).end) for r in records], [HeldOut(r[: span_of_motion(r).end]) for r in whole]
     if not 0 < holdout < 1:
         raise ValueError(
@@ -46,27 +46,6 @@ def split(
     part = _first if first else _last
     parts = [part(r, holdout, i) for i, r in enumerate(records)]
     return [fitted for fitted, _ in parts], [held for _, held in parts]
-
-
-def _as_list(records: Record | Sequence[Record]) -> list[Record]:
-    return [records] if isinstance(records, Record) else list(records)
-
-
-def records_of(record: Record | Sequence[Record]) -> list[Record]:
-    """The records to fit, one or several.
-
-    Raises
-    ------
-    ValueError, TypeError
-        If there are none, or one is no record.
-    """
-    records = _as_list(record)
-    if not records:
-        raise ValueError("`record` must hold at least one record; the sequence is empty.")
-    for item in records:
-        if not isinstance(item, Record):
-            raise TypeError(f"`record` must be a jfsm.Record or a sequence of them; got {type(item).__name__}.")
-    return records
 
 
 def _first(record: Record, share: float, which: int) -> tuple[tuple[Record, int], HeldOut]:

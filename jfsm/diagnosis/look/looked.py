@@ -88,16 +88,18 @@ def held_out_alike(
     if holdout is None or isinstance(holdout, int | float):
         return holdout
     held = [holdout] if isinstance(holdout, Record) else list(holdout)
+    for record in held:
+        _stop_at(look(record).checks, [record], "holdout")
     return [_turned(mended(record), looked.inverted) for record in held]
 
 
-def _stop_at(checks: Sequence[Check], records: Sequence[Record]) -> None:
+def _stop_at(checks: Sequence[Check], records: Sequence[Record], name: str = "record") -> None:
     """Refuse records of which a look shows that nothing can be fitted."""
     found = [check for check in checks if not check.passed and check.name in STOPS]
     if found:
         assumed = "" if all(check.name == "channel_moves" for check in found) else _assumed(records)
         words = "; ".join(dict.fromkeys(check.says for check in found))
-        raise ValueError(f"`record` cannot be used: {words}. {assumed}".strip())
+        raise ValueError(f"`{name}` cannot be used: {words}. {assumed}".strip())
 
 
 def _stop_at_motion(inverted: Sequence[tuple[str, int]], checks: Sequence[Check]) -> None:

@@ -1,6 +1,7 @@
 """The parts of a diagnosis from the file of its numbers."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from ..._result import Estimate
@@ -34,12 +35,17 @@ def fields_of(numbers: Mapping[str, Any]) -> dict[str, Any]:
         sentence=numbers["sentence"],
         advice=numbers["advice"],
         told={name: each for name, each in numbers.items() if name not in _DRAWN},
-        drawn=lambda: {name: numbers[name] for name in _DRAWN},
+        drawn=partial(_drawn, numbers),
         decision=Decision.of_plain(numbers["decision"]),
         modes=made_of(tuple[Mode, ...], numbers["modes"]),
         finished=numbers["finished"],
         untried=tuple(numbers["untried"]),
     )
+
+
+def _drawn(numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """What was made for pictures only; a function of a module, so that a diagnosis can be pickled."""
+    return {name: numbers[name] for name in _DRAWN}
 
 
 def _gain(written: Mapping[str, Any] | None) -> Gain | None:

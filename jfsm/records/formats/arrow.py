@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, optional_package
+from jfsm.records.formats.expansion import require_room
 from jfsm.records.formats.headings import headings_of
 
 
@@ -28,6 +29,7 @@ class ArrowFormat(AbstractFormat):
         def columns(names: list[str] | None) -> Any:
             try:
                 if is_parquet:
+                    require_room(8 * parquet.read_metadata(path).num_rows * len(names or ()), path)
                     return parquet.read_schema(path) if names is None else parquet.read_table(path, columns=names)
                 if names is None:
                     _walk(arrow, path)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from jfsm.records._channels import as_instant
 from jfsm.records._units import find_unit
 from jfsm.records.formats.base import Contents
 from jfsm.records.formats.lookup import Choice, choose, listed, samples_of
@@ -440,7 +441,7 @@ def _stated_by(contents: Contents, name: str) -> float | None:
 
 
 def _counted(contents: Contents, source: str, chosen: Sequence[Choice], rate: float) -> Seconds:
-    if not (np.isfinite(rate) and rate > 0):
+    if not (np.isfinite(as_instant("rate", rate)) and rate > 0):
         raise ValueError(f"`rate` must be a positive number of samples per second; it was {rate}. Pass rate=... [Hz].")
     size = samples_of(contents, source, chosen[0]).shape[0] if chosen else 0
     return np.arange(size) / rate

@@ -3,6 +3,7 @@
 import importlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -182,9 +183,11 @@ def _contents(table: _Table) -> Contents:
 
     def column(name: str) -> NDArray[Any]:
         if name in texts:
-            raise ValueError(f"The column {name!r} must hold numbers to be a channel; it holds text. Name another.")
+            raise ValueError(
+                f"The column {name!r} must hold numbers to be a channel; it holds text. Convert it, or name another."
+            )
         values = table.column(places[name])[rows]
-        return _read(values, name) if name in as_text else values
+        return _read(values, name) if name in as_text else as_numbers(values)
 
     left_out = (f"Neither numbers nor text, and left out: {', '.join(neither[:6])}.",) if neither else ()
     converted = f"Numbers are kept as text in {', '.join(map(repr, as_text))}; they are read as numbers."
@@ -214,14 +217,21 @@ def _read(values: NDArray[Any], name: str) -> NDArray[np.float64]:
         ) from error
 
 
+def as_numbers(values: NDArray[Any]) -> NDArray[Any]:
+    """A column of objects that are numbers, or missing, as doubles; any other as it is."""
+    if values.dtype.kind != "O" or not all(value is None or isinstance(value, Real) for value in values):
+        return values
+    return np.array([np.nan if value is None else float(value) for value in values])
+
+
 def _sorted(places: Mapping[str, int], column: Callable[[int], NDArray[Any]]) -> tuple[list[str], list[str], list[str]]:
     """Names of columns of numbers, of text, and of anything else."""
     numbers, texts, neither = list[str](), list[str](), list[str]()
     for name, place in places.items():
-        values = column(place)
+        values = as_numbers(column(place))
         if values.dtype.kind in "iufbmM":
             numbers.append(name)
-        elif values.size and all(isinstance(value, str) or hasattr(value, "isoformat") for value in values[:100]):
+        elif values.size and any(isinstance(value, str) or hasattr(value, "isoformat") for value in values):
             texts.append(name)
         else:
             neither.append(name)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from jfsm.records.formats.base import ABOUT, AbstractFormat, Contents, Lazy, left_out
+from jfsm.records.formats.expansion import OversizeError, require_room
 from jfsm.records.formats.hdf5_texts import numbers_of, text_of, texts_of
 from jfsm.records.formats.preambles import names_rate, rate_by_name, stated_rate
 
@@ -46,12 +47,14 @@ class Hdf5Format(AbstractFormat):
                 return
             if item.shape is None:
                 return
-            if not isinstance(name, str) or item.external:  # a name that is no text comes as bytes
+            if not isinstance(name, str) or is_elsewhere(item):  # a name that is no text comes as bytes
                 skipped.append(f"{name} (stored outside the file)" if isinstance(name, str) else repr(name))
                 return
             places.update(_places(name, item))
-            if unit := text_of(item, "units") or text_of(item, "unit"):
-                units[name] = unit
+            stated = _units(name, item)
+            units.update(stated)
+            if not stated and (ignored := [key for key in ("units", "unit") if key in item.attrs]):
+                notes.append(f"The {ignored[0]} of {name!r} are {_shown(item, ignored[0])}, and are not used.")
             for key, value in _rates(item):
                 if rate := rate_by_name(key, value):
                     rates[name] = (rate, max(item.shape, default=0))
@@ -104,6 +107,27 @@ class Hdf5Format(AbstractFormat):
             for name, array in contents.arrays.items():
                 file.create_dataset(name, data=array)
                 file[name].attrs["units"] = contents.units.get(name, "1")
+
+
+def _units(name: str, item: Any) -> dict[str, str]:
+    """The unit that a dataset states, or those of its columns, where it lists one for each."""
+    listed = texts_of(item, "units") or texts_of(item, "unit")
+    if len(set(listed)) == 1:
+        return {name: listed[0]} if listed[0] else {}
+    if item.ndim == 2 and len(listed) == min(item.shape):
+        return {f"{name}[{place}]": unit for place, unit in enumerate(listed) if unit}
+    return {}
+
+
+def _shown(item: Any, key: str) -> str:
+    """An attribute in words, in short."""
+    listed = texts_of(item, key)
+    return f"a list of {len(listed)}, {', '.join(map(repr, listed[:3]))}" if listed else "no text"
+
+
+def is_elsewhere(item: Any) -> bool:
+    """Whether numbers of a dataset lie in other files, which a file from a stranger could name at will."""
+    return bool(item.external) or item.is_virtual and any(source.file_name != "." for source in item.virtual_sources())
 
 
 def _places(name: str, item: Any) -> dict[str, tuple[str, str | None]]:
@@ -218,10 +242,18 @@ def opened(path: Path, demand: str) -> Iterator["h5py.File"]:
     with file:
         try:
             yield file
+        except OversizeError:
+            raise
         except Exception as error:  # whatever the library stumbles over in a part that is damaged
             raise ValueError(f"{demand}; parts of it cannot be read ({error}). Write or copy it again.") from error
 
 
 def dataset(file: "h5py.File", name: str) -> np.ndarray:
     """All values of one dataset."""
-    return np.asarray(file[name][()])  # pyright: ignore[reportIndexIssue]  # a name that was found to be a dataset
+    return whole(file[name])
+
+
+def whole(item: Any) -> np.ndarray:
+    """All values of a dataset, if there is room for them."""
+    require_room(item.size * item.dtype.itemsize, Path(item.file.filename))
+    return np.asarray(item[()])

@@ -21,7 +21,7 @@ _NOWHERE = (0, 2**64 - 1)
 
 
 def text_of(item: Any, name: str) -> str:
-    """The text of an attribute; empty if there is none, or it is none.
+    """The text of an attribute; empty if there is none, it is none, or it holds several.
 
     Raises
     ------

@@ -1,12 +1,12 @@
 """Columns of numbers in JSON."""
 
-import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
+from jfsm._files import parsed_json
 from jfsm.records.formats.base import AbstractFormat, Contents, Lazy
 from jfsm.records.formats.headings import headings_of
 
@@ -96,10 +96,10 @@ def _parsed(path: Path) -> Any:
     """
     given = path.read_bytes()
     try:
-        return json.loads(given)
+        return parsed_json(given)
     except ValueError as error:
         try:
-            lines = [json.loads(line) for line in given.splitlines() if line.strip()]
+            lines = [parsed_json(line) for line in given.splitlines() if line.strip()]
         except ValueError:
             lines = []
         if len(lines) > 1:

@@ -67,8 +67,17 @@ def choose(contents: Contents, source: str, kind: str, name: str) -> Choice:
     skipped = next((note for note in contents.notes if re.search(rf"(?<!\w){re.escape(base)}(?!\w)", note)), None)
     hint = f" {skipped}" if skipped is not None else hint
     raise ValueError(
-        f"`{kind}` must name a channel of {source}, which holds {listed(contents.arrays)}; it was {name!r}.{hint}"
+        f"`{kind}` must name a channel of {source}, which holds {listed(contents.arrays)}; it was "
+        f"{name!r}.{hint}{_why(contents, base)}"
     )
+
+
+def _why(contents: Contents, name: str) -> str:
+    """What the reader says of a name that it left out."""
+    said = [
+        note for note in contents.notes if "eft out" in note and re.search(rf"(?<!\w){re.escape(name)}(?!\w)", note)
+    ]
+    return f" {said[0]}" if said else ""
 
 
 def _meant(contents: Contents, text: str) -> tuple[str, ...]:

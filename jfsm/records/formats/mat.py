@@ -8,8 +8,10 @@ from typing import Any, ClassVar
 import numpy as np
 import scipy.io
 
+from jfsm._files import parsed_json
 from jfsm.records.formats import mat73
 from jfsm.records.formats.base import ABOUT, AbstractFormat, Contents, Lazy
+from jfsm.records.formats.expansion import OversizeError
 from jfsm.records.formats.hdf5 import NUMERIC
 from jfsm.records.formats.mat5 import require_sound
 from jfsm.records.formats.mat_texts import Column, described
@@ -31,12 +33,17 @@ class MatFormat(AbstractFormat):
         except NotImplementedError:  # of version 7.3
             found, remark = mat73.variables(path)
             return _found(found).contents({}, path, remark)
+        except OversizeError:
+            raise
         except Exception as error:  # whatever the reader stumbles over in bytes that are no such file
             raise ValueError(
                 f"{path.name} must be a MATLAB file; it cannot be opened as one ({error}), and may be cut short. "
                 f"Write or copy it again."
             ) from error
-        remarks = json.loads(str(variables.pop(ABOUT))) if ABOUT in variables else {}
+        try:
+            remarks = parsed_json(str(variables.pop(ABOUT))) if ABOUT in variables else {}
+        except ValueError as error:
+            raise ValueError(f"{path.name} must hold JSON in {ABOUT}; {error}. Write or copy it again.") from error
         return _found(variables).contents(remarks, path)
 
     def save(self, path: Path, contents: Contents) -> None:

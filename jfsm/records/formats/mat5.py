@@ -8,6 +8,8 @@ import zlib
 from pathlib import Path
 from typing import BinaryIO, Literal
 
+from jfsm.records.formats.expansion import require_room
+
 _HEADER, _TAG = 128, 8  # bytes ahead of the elements, and of a tag
 _MATRIX, _COMPRESSED = 14, 15
 _NUMBERS = (1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18)  # kinds of elements that hold numbers or text
@@ -31,12 +33,12 @@ def require_sound(path: Path) -> None:
         order = _ORDERS.get(head[126:128])
         if order is None or int.from_bytes(head[124:126], order) != 0x0100:
             return
-        _Checked(stream, order).file(os.fstat(stream.fileno()).st_size)
+        _Checked(stream, order, path).file(os.fstat(stream.fileno()).st_size)
 
 
 class _Checked:
-    def __init__(self, stream: BinaryIO, order: Order):
-        self._stream = stream
+    def __init__(self, stream: BinaryIO, order: Order, path: Path):
+        self._stream, self._path, self._unpacked = stream, path, 0
         self._order: Order = order
 
     def file(self, size: int) -> None:
@@ -77,7 +79,8 @@ class _Checked:
         for at in range(start, end, _CHUNK):
             packed = self._stream.read(min(_CHUNK, end - at))
             while packed:
-                unpacking.decompress(packed, _CHUNK)
+                self._unpacked += len(unpacking.decompress(packed, _CHUNK))
+                require_room(self._unpacked, self._path)
                 packed = unpacking.unconsumed_tail
         if not unpacking.eof:
             raise ValueError(f"the variable at byte {start} is cut short")

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from jfsm.records.formats.hdf5 import NUMERIC, dataset, longer_than_stated, opened
+from jfsm.records.formats.hdf5 import NUMERIC, dataset, is_elsewhere, longer_than_stated, opened, whole
 from jfsm.records.formats.hdf5_texts import text_of
 
 
@@ -75,12 +75,12 @@ def _value(item: Any, path: Path, demand: str) -> Any:
         return _struct({name: item[name] for name in _inside(item)}, item.file, path, demand)
     if "MATLAB_empty" in item.attrs or item.shape is None:
         return np.empty(0)
-    if item.external:
+    if is_elsewhere(item):
         return Unread("stored outside the file")
     if item.dtype.kind == "O":
         return _cells([_value(item.file[one], path, demand) for one in _references(item)])
     if kind == "char" and item.dtype.kind in "ui":
-        return "".join(map(chr, item[()].T.ravel(order="F").tolist()))
+        return "".join(map(chr, whole(item).T.ravel(order="F").tolist()))
     return Late(path, demand, item) if item.dtype.kind in NUMERIC else Unread(kind or str(item.dtype))
 
 
@@ -98,7 +98,7 @@ def _struct(fields: Mapping[str, Any], file: Any, path: Path, demand: str) -> An
 
 def _references(item: Any) -> list[Any]:
     """What a dataset of references refers to, in MATLAB's order."""
-    return item[()].T.ravel(order="F").tolist()
+    return whole(item).T.ravel(order="F").tolist()
 
 
 def _cells(values: list[Any]) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 import datetime
 import io
+import zipfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 
 from jfsm.records._runs_of import runs_of
 from jfsm.records.formats.base import AbstractFormat, Contents, Lazy, optional_package
+from jfsm.records.formats.expansion import OversizeError, require_room_in_workbook
 from jfsm.records.formats.headings import headings_of
 from jfsm.records.formats.numbers import decimal_mark, is_gap, is_number, is_summary, number
 from jfsm.records.formats.preambles import stated_rate
@@ -41,8 +43,12 @@ class SpreadsheetFormat(AbstractFormat):
     def load(self, path: Path) -> Contents:
         calamine: Any = optional_package("python_calamine", "excel", path)
         try:
+            if zipfile.is_zipfile(path):
+                require_room_in_workbook(path)
             book = calamine.CalamineWorkbook.from_filelike(io.BytesIO(path.read_bytes()))  # whatever its ending
             sheets = {name: book.get_sheet_by_name(name).to_python(skip_empty_area=False) for name in book.sheet_names}
+        except OversizeError:
+            raise
         except Exception as error:  # whatever the reader stumbles over in bytes that are no such file
             raise ValueError(
                 f"{path.name} must be a spreadsheet; it cannot be opened as one ({error}), and may be cut short or of "

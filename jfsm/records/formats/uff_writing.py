@@ -12,6 +12,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from jfsm._files import parsed_json
 from jfsm.records.formats.base import ABOUT, Contents
 
 # specific data types, and what they are here; a reaction force (9) is read as a force
@@ -48,7 +49,7 @@ def about_from(codes: np.ndarray, path: Path) -> Mapping[str, Any]:
         If they are damaged.
     """
     try:
-        return json.loads("".join(chr(round(code)) for code in codes.tolist()))
+        return parsed_json("".join(chr(round(code)) for code in codes.tolist()))
     except (ValueError, OverflowError) as error:
         raise ValueError(
             f"{path.name} must hold the remarks of the record that was written to it; they are damaged ({error}). Copy "

@@ -55,7 +55,7 @@ def as_trend(trend: str | PolynomialTrend) -> PolynomialTrend:
         if trend.order < 0:
             raise ValueError(f"`trend` must have an order of 0 or more; got {trend.order}.")
         return trend
-    if trend not in TRENDS:
+    if not isinstance(trend, str) or trend not in TRENDS:
         names = ", ".join(repr(name) for name in TRENDS)
         raise ValueError(f"`trend` must be one of {names} or a PolynomialTrend; got {trend!r}.")
     return TRENDS[trend]

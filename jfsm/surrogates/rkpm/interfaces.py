@@ -1,6 +1,6 @@
 """Lines and surfaces across which a map may jump or kink: nodes on the other side do not count."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import equinox as eqx
@@ -64,6 +64,10 @@ def as_interfaces(across: Any, dim: int) -> tuple[Interface, ...]:
     TypeError, ValueError
         If one is no function of a state that returns one number.
     """
+    if not isinstance(across, Iterable) or isinstance(across, jax.Array | str):
+        raise TypeError(
+            f"`across` must be a list of functions of one state such as Plane((1, 0), 0.0); got {across!r}."
+        )
     found = tuple(across)
     for level in found:
         if not callable(level):

@@ -104,6 +104,8 @@ class RKPM(AbstractScatteredMap):
         help, the evaluation raises a RuntimeError.
         """
         order = whole_number(order, "order", 1)
+        if not isinstance(robust, bool | np.bool_):
+            raise TypeError(f"`robust` must be True or False; got {robust!r}.")
         nodes = prepare_nodes(states, force, order)
         rule = weighing_rule(nodes, order, neighbours, window, dilation, across)
         return cls(doubted(nodes, rule) if robust else nodes, rule)

@@ -1,12 +1,12 @@
 """What a table of text and the lines around it say."""
 
-import json
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from jfsm._files import parsed_json
 from jfsm.records._units import is_unit
 from jfsm.records.formats.base import Contents, Lazy
 from jfsm.records.formats.headings import Headings, headings_of
@@ -70,7 +70,7 @@ class _Described:
             headings, understood = self._headings(first, width)
         names = headings.names
         units = {**self._listed_units(segment, headings, understood), **headings.units}
-        about = next((_about(line) for _, line in segment.above if line.startswith(MARK)), {})
+        about = next((_about(line, self._path) for _, line in segment.above if line.startswith(MARK)), {})
         rate = stated_rate(line for _, line in segment.above if not line.startswith(MARK))
         said = [*notes, *headings.notes, *self._unread(segment, headings, understood, rate and rate.words, width)]
 
@@ -219,6 +219,13 @@ def _around(segments: Sequence[Segment], file: TextFile) -> list[str]:
     comments = [line for segment in segments for line in segment.comments]
     if comments:
         notes.append(f"{len(comments)} remarks between the rows are left out: {_quoted(comments)}.")
+    for segment in segments:
+        for place, (number, text, value) in segment.doubtful.items():
+            if place not in segment.grouped:
+                notes.append(
+                    f"Warning: line {number} holds {text!r} in column {place + 1}, which is read as {value:g}; its "
+                    "mark stands between whole and fraction, or between thousands. Write it as the others are."
+                )
     extra = [line for segment in segments for line in segment.extra]
     if extra:
         notes.append(f"{len(extra)} rows have a field too many, which is left out: {_quoted(extra)}.")
@@ -230,5 +237,10 @@ def _quoted(lines: Sequence[Line]) -> str:
     return shown + (f" and {len(lines) - SHOWN} more" if len(lines) > SHOWN else "")
 
 
-def _about(line: str) -> dict:
-    return json.loads(line.removeprefix(MARK))
+def _about(line: str, path: Path) -> dict:
+    try:
+        return parsed_json(line.removeprefix(MARK))
+    except ValueError as error:
+        raise ValueError(
+            f"{path.name} must hold JSON after {MARK!r}; {error}. Repair that line, or remove it."
+        ) from error

@@ -1,5 +1,6 @@
 """The rows of a text as columns of doubles, and what stands between them."""
 
+import re
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -7,6 +8,9 @@ import numpy as np
 from jfsm.records.formats.numbers import is_gap, is_number, is_summary
 from jfsm.records.formats.text.layout import Layout, fields_of, is_comment, values_of
 from jfsm.records.formats.text.lines import Line, TextFile
+
+_DOUBTFUL = {mark: re.compile(rf"[-+]?\d{{1,3}}[{mark}]\d{{3}}") for mark in ".,"}
+"""A number with the mark that stands between thousands elsewhere in the file, and nothing that tells whether here."""
 
 
 @dataclass
@@ -29,6 +33,10 @@ class Segment:
         Of columns of numbers the first field that is none.
     comments, extra : list of Line
         Remarks between rows; rows with one field too many.
+    doubtful : dict of int to (line, field, number)
+        Of columns of numbers the first field whose mark may be that of a fraction or stand between thousands.
+    grouped : set of int
+        Columns with fields of both marks, which show that theirs stand between thousands.
     below : list of Line
         What follows the last row of the file.
     """
@@ -42,6 +50,8 @@ class Segment:
     text: dict[int, Line] = field(default_factory=dict)
     comments: list[Line] = field(default_factory=list)
     extra: list[Line] = field(default_factory=list)
+    doubtful: dict[int, tuple[int, str, float]] = field(default_factory=dict)
+    grouped: set[int] = field(default_factory=set)
     below: list[Line] = field(default_factory=list)
 
     @property
@@ -58,6 +68,9 @@ class Table:
         self._numeric = [place for place, used in enumerate(layout.numeric) if used]
         self.values = np.empty((layout.lines, layout.width), order="C")
         self.segments: list[Segment] = []
+        self._mixed = layout.delimiter != "," and not layout.plain
+        comma = any(mark == "," for mark, used in zip(layout.marks, layout.numeric, strict=True) if used)
+        self._thousands = ["." if comma else "," for _ in layout.marks]
         self._rows = 0
         self._waiting: list[Line] = []  # lines since the last row
         self._broken: Line | None = None  # a row with a wrong number of fields, which may be the last
@@ -165,6 +178,10 @@ class Table:
         for place, value in enumerate(values_of(fields[:width], self._layout)):
             if value is not None:
                 row[place] = value
+                if "." in fields[place] and "," in fields[place]:
+                    segment.grouped.add(place)
+                elif self._mixed and _DOUBTFUL[self._thousands[place]].fullmatch(fields[place]):
+                    segment.doubtful.setdefault(place, (number, fields[place], value))
             elif self._layout.numeric[place]:
                 segment.text.setdefault(place, (number, fields[place]))
         self.values[self._rows] = row
