@@ -28,16 +28,25 @@ def check_settings(
         raise ValueError(f"`time_limit` must be positive, in seconds; got {time_limit!r}. Without it there is none.")
     if reconstruction is not None:
         check_reconstruction(reconstruction)
-    if progress is not None and not isinstance(progress, bool | Callable):
+    _check_progress(progress)
+    check_causes(causes)
+    check_key(key)
+
+
+def check_causes(causes: Any) -> None:
+    """Refuse what names no causes; errors as of `check_settings`."""
+    law = AbstractTerm | AbstractSensor | Cause | type
+    if causes is not None and (hasattr(causes, "dtype") or not isinstance(causes, Iterable | law)):
+        raise TypeError(f'`causes` must be a list, as ["coulomb", jfsm.Stribeck]; got {causes!r}.')
+    chosen_causes(causes)
+
+
+def _check_progress(progress: Any) -> None:
+    if progress is not None and (isinstance(progress, type) or not isinstance(progress, bool | Callable)):
         raise TypeError(
             f"`progress` must be a function of (what, done, total), True, False or None; got {progress!r}. Leave it "
             "out for a bar on a terminal."
         )
-    law = AbstractTerm | AbstractSensor | Cause | type
-    if causes is not None and not isinstance(causes, Iterable | law):
-        raise TypeError(f'`causes` must be a list, as ["coulomb", jfsm.Stribeck]; got {causes!r}.')
-    chosen_causes(causes)
-    check_key(key)
 
 
 def check_key(key: Any) -> None:

@@ -200,7 +200,7 @@ def check_names(model: Structure, fixed: Any, bounds: Any) -> None:
     TypeError, ValueError
         It names the argument.
     """
-    if not isinstance(fixed, Iterable) or isinstance(fixed, np.ndarray):
+    if not isinstance(fixed, Iterable) or hasattr(fixed, "dtype"):
         raise TypeError(f'`fixed` must be names, as ("mass", "stiffness@0-1.k"); got {fixed!r}.')
     if bounds is not None and not isinstance(bounds, Mapping):
         raise TypeError(f'`bounds` must be intervals by name, as {{"mass": (0.9, 1.1)}}; got {bounds!r}.')

@@ -43,7 +43,7 @@ def opened(source: Any) -> tuple[Contents, str, str | None]:
         return format_of(path).load(path), path.name, path.stem
     if is_frame(source):
         return contents_of_frame(source), f"the {type(source).__name__}", None
-    if isinstance(source, Mapping | Iterable):
+    if isinstance(source, Mapping | Iterable) and not hasattr(source, "dtype"):
         return contents_of_channels(source), "`channels`", None
     raise TypeError(
         f"`source` must be the path of a file, a DataFrame, a Dataset of xarray, or a list of channels after SEP 5; it "

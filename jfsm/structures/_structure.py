@@ -63,7 +63,7 @@ class Structure(eqx.Module):
         self.terms = _parts(terms, "terms", AbstractTerm)
         self.sensors = _parts(sensors, "sensors", AbstractSensor)
         try:
-            self.trust = tuple(dict(trust).items())
+            self.trust = tuple((str(name), float(share)) for name, share in dict(trust).items())
         except (TypeError, ValueError):
             raise TypeError(f"`trust` must be shares by name, as {{'stiffness': 0.05}}; got {trust!r}.") from None
         self.own, self.own_numbers = None, np.zeros(0)

@@ -21,6 +21,8 @@ def rows_where(contents: Contents, source: str, where: Mapping[str, str | float]
     """
     mask = np.empty(0, dtype=bool)
     for name, value in where.items():
+        if not isinstance(name, str):
+            raise TypeError(f"`where` must name columns, as {{'run': 3}}; one name is {name!r}.")
         column = _column(contents, source, name, value)
         if column.ndim != 1 or (mask.size and column.shape != mask.shape):
             raise ValueError(

@@ -132,7 +132,8 @@ class Kriging(AbstractForceStateMap):
         """
         require_x64()
         trend = as_trend(trend)
-        dim = np.shape(states)[1] if np.ndim(states) == 2 else 1
+        states = states if hasattr(states, "shape") else as_array(states, "states", 2)
+        dim = states.shape[1] if len(states.shape) == 2 else 1
         states, columns = check_readings(states, force, len(trend.exponents(dim)))
         vector = columns.ndim == 2
         columns = columns.reshape(len(states), -1)
@@ -410,7 +411,7 @@ def _correlation(correlation: Any) -> AbstractCorrelation:
 def _numbers(value: Any, name: str, ndim: int | tuple[int, ...]) -> Array:
     if isinstance(value, Tracer):
         return value
-    array = np.asarray(value)
+    array = value if name != "log_parameters" else np.asarray(value)
     if name == "log_parameters" and np.any(np.isneginf(array)):  # a nugget of zero
         return jnp.asarray(array)
     return jnp.asarray(as_array(array, name, ndim))
