@@ -22,7 +22,7 @@ def check_settings(
     TypeError, ValueError
         It names the argument.
     """
-    if not isinstance(max_causes, Integral) or isinstance(max_causes, bool) or max_causes < 1:
+    if not _is_whole(max_causes) or max_causes < 1:
         raise ValueError(f"`max_causes` must be at least 1, a whole number; got {max_causes!r}. Leave it out for 2.")
     if time_limit is not None and not _is_positive(time_limit):
         raise ValueError(f"`time_limit` must be positive, in seconds; got {time_limit!r}. Without it there is none.")
@@ -31,6 +31,10 @@ def check_settings(
     _check_progress(progress)
     check_causes(causes)
     check_key(key)
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, Integral) and not isinstance(value, bool)
 
 
 def check_causes(causes: Any) -> None:

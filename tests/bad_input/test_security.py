@@ -23,6 +23,9 @@ ALLOWED = {
     ("cli/_laws.py", ".exec_module"),  # laws of the user's own, from files that the command line names
     ("fleet/_work.py", "pickle"),  # a model on its way to a process of the user's own
     ("fleet/_many.py", "pickle"),  # whether it can go there
+    ("adapters/fmu.py", "pickle"),  # what a process of its own is to run
+    ("adapters/_fmu_run.py", "pickle"),
+    ("adapters/fmu.py", ".extract"),  # an FMU, which is a program and is run
 }
 RUNS_TEXT = {"eval", "exec", "compile", "__import__", ".exec_module", "run_path", ".run_path", ".run_module"}
 REACHES = {"socket", "urllib.request", "http", "http.client", "requests", "ftplib", "smtplib", "xmlrpc", "webbrowser"}
