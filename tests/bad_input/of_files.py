@@ -134,7 +134,7 @@ def _file(name: str, file: str, content: str | bytes, says: str) -> Row:
     return refused(name, lambda s: s.read(s.file(file, content)), says)
 
 
-HOSTILE = "<script>alert(1)</script> F"
+HOSTILE = "<img src=x onerror=alert(1)>F"
 
 ROWS: list[Row] = [
     refused("no such file", lambda s: s.read(s.folder / "gone.csv"), r"gone\.csv", FileNotFoundError),
@@ -157,7 +157,7 @@ ROWS: list[Row] = [
     _file("a lost reading", "a.csv", csv_text().replace(csv_text().splitlines()[9].split(",")[1], "nan", 1), r"must be finite"),
     _file("a name that is not there", "a.csv", csv_text(header="time,G,x"), r"`force` must name a channel of a\.csv, which holds 'time', 'G', 'x'; it was 'F'"),
     _file("two columns of one name", "a.csv", csv_text("time,F,F,x", (T, FORCE, 2 * FORCE, MOTION)), r"`force` must name one channel of a\.csv; 'F' may be 'F \(2\)' or 'F \(3\)'"),
-    right("a name of markup", lambda s: jfsm.read(s.file("a.csv", csv_text(f"time,{HOSTILE},x")), force=HOSTILE, displacement="x"), len),
+    right("a name of markup", lambda s: jfsm.read(s.file("a.csv", csv_text(f"time,{HOSTILE},x")), force=HOSTILE, displacement="x", units={HOSTILE: "N"}), len),
     right("decimal commas, and 6.234", lambda s: _decimal_comma(s, "6.234").notes, lambda notes: any("line 51 holds '6.234' in column 2, which is read as 6234" in note for note in notes)),
     right("decimal commas, and thousands", lambda s: _decimal_comma(s, "1.006,234").notes, lambda notes: not any("Warning" in note for note in notes)),
     right("a BOM", lambda s: s.read(s.file("a.csv", b"\xef\xbb\xbf" + csv_text().encode())), len),
