@@ -77,7 +77,7 @@ def sources_of(records: Any, reading: Reading) -> list[Source]:
     """
     if isinstance(records, str | os.PathLike | Record):
         records = [records]
-    if not isinstance(records, Mapping | Iterable):
+    if hasattr(records, "dtype") or not isinstance(records, Mapping | Iterable):
         raise TypeError(f"`records` must be paths or records, or a mapping of names to these; got {records!r}.")
     given = list(records.values()) if isinstance(records, Mapping) else list(records)
     if not given:
