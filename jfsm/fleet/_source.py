@@ -77,6 +77,18 @@ def sources_of(records: Any, reading: Reading) -> list[Source]:
     """
     if isinstance(records, str | os.PathLike | Record):
         records = [records]
+    given = _given(records)
+    names = list(map(str, records)) if isinstance(records, Mapping) else _names(given)
+    return [
+        Source(name, slug, None, each)
+        if isinstance(each, Record)
+        else Source(name, slug, os.fspath(Path(each).absolute()), None, reading)
+        for name, slug, each in zip(names, _slugs(names), given, strict=True)
+    ]
+
+
+def _given(records: Any) -> list[Any]:
+    """The paths and records, checked; errors as of `sources_of`."""
     if hasattr(records, "dtype") or not isinstance(records, Mapping | Iterable):
         raise TypeError(f"`records` must be paths or records, or a mapping of names to these; got {records!r}.")
     given = list(records.values()) if isinstance(records, Mapping) else list(records)
@@ -85,13 +97,7 @@ def sources_of(records: Any, reading: Reading) -> list[Source]:
     for place, each in enumerate(given):
         if not isinstance(each, str | os.PathLike | Record):
             raise TypeError(f"`records` must be paths or records; number {place + 1} is {each!r}.")
-    names = list(map(str, records)) if isinstance(records, Mapping) else _names(given)
-    return [
-        Source(name, slug, None, each)
-        if isinstance(each, Record)
-        else Source(name, slug, os.fspath(Path(each).absolute()), None, reading)
-        for name, slug, each in zip(names, _slugs(names), given, strict=True)
-    ]
+    return given
 
 
 def _names(given: Sequence[Any]) -> list[str]:
