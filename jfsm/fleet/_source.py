@@ -77,14 +77,7 @@ def sources_of(records: Any, reading: Reading) -> list[Source]:
     """
     if isinstance(records, str | os.PathLike | Record):
         records = [records]
-    if not isinstance(records, Mapping | Iterable):
-        raise TypeError(f"`records` must be paths or records, or a mapping of names to these; got {records!r}.")
-    given = list(records.values()) if isinstance(records, Mapping) else list(records)
-    if not given:
-        raise ValueError("`records` must hold at least one record; it is empty. Look at the pattern of the files.")
-    for place, each in enumerate(given):
-        if not isinstance(each, str | os.PathLike | Record):
-            raise TypeError(f"`records` must be paths or records; number {place + 1} is {each!r}.")
+    given = _given(records)
     names = list(map(str, records)) if isinstance(records, Mapping) else _names(given)
     return [
         Source(name, slug, None, each)
@@ -92,6 +85,19 @@ def sources_of(records: Any, reading: Reading) -> list[Source]:
         else Source(name, slug, os.fspath(Path(each).absolute()), None, reading)
         for name, slug, each in zip(names, _slugs(names), given, strict=True)
     ]
+
+
+def _given(records: Any) -> list[Any]:
+    """The paths and records, checked; errors as of `sources_of`."""
+    if hasattr(records, "dtype") or not isinstance(records, Mapping | Iterable):
+        raise TypeError(f"`records` must be paths or records, or a mapping of names to these; got {records!r}.")
+    given = list(records.values()) if isinstance(records, Mapping) else list(records)
+    if not given:
+        raise ValueError("`records` must hold at least one record; it is empty. Look at the pattern of the files.")
+    for place, each in enumerate(given):
+        if not isinstance(each, str | os.PathLike | Record):
+            raise TypeError(f"`records` must be paths or records; number {place + 1} is {each!r}.")
+    return given
 
 
 def _names(given: Sequence[Any]) -> list[str]:

@@ -154,7 +154,9 @@ def _outcome(call: Callable[[], Any], names: list[str]) -> tuple[str, str]:
             r"not supported between|has no attribute|object is not|unpack|could not be safely|unexpected keyword", words
         )
         return (
-            "clear" if not native and re.search(r"`|\.csv|arameter|wrong way round|directory", words) else "unclear"
+            "clear"
+            if not native and re.search(r"`|\.csv|arameter|wrong way round|directory|name too long", words)
+            else "unclear"
         ), words
     except Exception as error:
         return "trace", "".join(traceback.format_exception(error)[-3:])

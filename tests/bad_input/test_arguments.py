@@ -6,7 +6,7 @@ from .arguments import tried
 
 
 @pytest.mark.parametrize(
-    ("python", "commands", "seed"), [(150, 60, 5), pytest.param(2000, 1000, 6, marks=pytest.mark.slow)]
+    ("python", "commands", "seed"), [(60, 40, 5), pytest.param(2000, 1000, 6, marks=pytest.mark.slow)]
 )
 def test_random_wrong_arguments_end_in_words(python: int, commands: int, seed: int):
     """`python -m bad_input.arguments 1000 1000`, in the folder of the tests, tries as many as one likes."""

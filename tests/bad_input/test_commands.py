@@ -54,9 +54,9 @@ def test_what_a_link_points_at_is_written_and_the_link_stays(tmp_path: Path):
     assert link.is_symlink() and page.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
 
 
-@pytest.mark.parametrize("encoding", ["cp1252", "ascii", "cp437"])
-def test_a_terminal_of_few_signs_shows_everything(encoding: str, tmp_path: Path):
-    """In a process of its own, whose streams have that encoding."""
+def test_a_terminal_of_few_signs_shows_everything(tmp_path: Path):
+    """In a process of its own, whose streams have an encoding without minus signs."""
+    encoding = "cp1252"
     record().write(tmp_path / "run.csv")
     words = [sys.executable, "-m", "jfsm", "inspect", str(tmp_path / "run.csv")]
     ended = subprocess.run(
