@@ -426,7 +426,7 @@ def test_laws_of_a_class_share_one_program(believed, monkeypatch):
     [
         ({"holdout": 1.5}, "`holdout` as a share must lie between 0 and 1"),
         ({"causes": ["rust"]}, "`causes` must name causes of the catalogue"),
-        ({"max_causes": 0}, "`max_causes` must be at least 1; got 0"),
+        ({"max_causes": 0}, "`max_causes` must be at least 1, a whole number; got 0"),
     ],
 )
 def test_arguments_out_of_range_are_refused_by_name(believed, arguments, message):

@@ -112,7 +112,7 @@ REFUSED = {
     "drop": (SDOF + jfsm.StiffnessDrop(1.0, 12.3, at=LINK), {}, "must not depend on time; the force of stiffness"),
     "no mass": (jfsm.Structure([0.0]), {}, r"`mass` must be positive for the structure to move; got \[0.0\]"),
     "force": (SDOF, {"force": [1.0, 2.0]}, r"one constant force per degree of freedom \(1\); got 2"),
-    "starts": (SDOF, {"starts": 0}, "`starts` must be 1 or more; got 0"),
+    "starts": (SDOF, {"starts": 0}, "`starts` must be 1 or more, a whole number; got 0"),
     "pair": (SDOF, {"within": 3.0}, r"`within` must be a pair \(low, high\) of displacements.*got 3.0"),
     "order": (SDOF, {"within": (1.0, -1.0)}, "with low below high"),
     "free": (jfsm.Structure.chain([1.0, 1.0], [0.0, 5.0]), {}, "rests anywhere along .* a continuum"),

@@ -124,7 +124,7 @@ def other(at=LINK) -> jfsm.Structure:
         (DUFFINGS, (np.zeros((3, 1)), np.zeros((3, 1))), {}, "`initial_states` must hold one state, or .* 5 struc.* 3"),
         (duffing(), (np.zeros((3, 2)), np.zeros((3, 2))), {}, r"`initial_states` must be two arrays \(runs, 1\); got"),
         (duffing(), (np.zeros((3, 1)), np.zeros((2, 1))), {}, r"`initial_states` must be two arrays \(runs, 1\); got"),
-        (duffing(), None, {"substeps": 0}, "`substeps` must be at least 1; got 0"),
+        (duffing(), None, {"substeps": 0}, "`substeps` must be at least 1, a whole number; got 0"),
         (jfsm.Structure([0.0]), None, {}, "`mass` must be positive for the structure to move"),
     ],
 )

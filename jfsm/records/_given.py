@@ -70,7 +70,7 @@ def require_one_unit(records: Sequence[Record], others: Sequence[Record] = (), n
 def shared_readings(records: Sequence[Record], others: Sequence[Record] = ()) -> tuple[int, int] | None:
     """The first pair of records, counted through both, of which one holds readings of the other; None without any.
 
-    Forces may be the same in two runs of one test, responses never are to the last bit. Without `others` all are
+    What drives may be the same in two runs of one test, what answers never is to the last bit. Without `others` all are
     compared among themselves; else each of these with each record.
     """
     every = [*records, *others]
@@ -98,8 +98,8 @@ def check_together(records: Sequence[Record]) -> None:
 
 
 def _share(one: Record, other: Record) -> bool:
-    both = [channel for channel in one.responses if channel in other.responses]
-    return bool(both) and all(_overlap(one.channels[c], other.channels[c]) for c in both)
+    both = [channel for channel in one.answers if channel in other.answers]
+    return bool(both) and all(_overlap(one.answers[c], other.answers[c]) for c in both)
 
 
 def _overlap(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
