@@ -34,9 +34,11 @@ from jfsm.records._reading import CUTS as CUTS
 from jfsm.records._reading import READ as READ
 from jfsm.records._reading import Reading as Reading
 from jfsm.records._record import Record as Record
+from jfsm.records._rest import drives_until as drives_until
 from jfsm.records._rest import rest_words as rest_words
 from jfsm.records._rest import rough_noise as rough_noise
 from jfsm.records._rest import span_of_motion as span_of_motion
+from jfsm.records._rest import way_gone as way_gone
 from jfsm.records._rolloff import rolloff as rolloff
 from jfsm.records._silence import silent_forces as silent_forces
 from jfsm.records._tapers import Pieces as Pieces

@@ -59,6 +59,29 @@ def _span(record: AbstractRecord, channels: list[tuple[NDArray[np.float64], floa
     return Span(begin if begin >= LONG * n and first else 0, end if n - end >= LONG * n and last else n)
 
 
+def way_gone(record: AbstractRecord) -> NDArray[np.float64]:
+    """Share of its whole way that the motion has gone at each sample, from 0 to 1, without what noise goes.
+
+    The way is that of the channels that do not drive, each in its own spread: of a record in pieces, the sum of how
+    much each piece moves.
+    """
+    blocks = np.array_split(np.arange(len(record)), BLOCKS)
+    moves = np.zeros(len(blocks))
+    for y in record.responses.values():
+        if np.ptp(y) > 0:
+            noise = noise_floor(y, record.dt).std
+            moves += [np.sqrt(max(np.var(y[block]) - noise**2, 0.0)) / np.std(y) for block in blocks]
+    gone = np.cumsum([0.0, *moves])
+    edges = [0, *(int(block[-1]) + 1 for block in blocks)]
+    return np.interp(np.arange(len(record)), edges, gone / gone[-1] if gone[-1] else np.linspace(0.0, 1.0, gone.size))
+
+
+def drives_until(record: AbstractRecord) -> int:
+    """Samples until every force channel shows no more than noise about its last level; 0 without a force."""
+    forces = [y for (kind, _), y in record.channels.items() if kind == "force" and np.ptp(y) > 0]
+    return max((_loud_until(y, noise_floor(y, record.dt).std) for y in forces), default=0)
+
+
 def _watched(record: AbstractRecord) -> list[NDArray[np.float64]]:
     """Channels that tell motion or drive."""
     named = list(record.channels.values())

@@ -3,9 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...records import Record, records_of, span_of_motion
+import numpy as np
+
+from ...records import Record, drives_until, records_of, span_of_motion, way_gone
 
 _LATER = "What the model lacks shows in the last part only: that was fitted, and the gain is that of the first part."
+_STILL = (
+    "The last {} of the time hold {:.0%} of the motion only: the part held out begins earlier, where {:.0%} are left."
+)
+LITTLE = 0.5
+"""What the last part of a driven record moves, in its share of the time, below which the way splits it."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +63,16 @@ def _first(record: Record, share: float, which: int) -> tuple[tuple[Record, int]
 
 
 def _last(record: Record, share: float, which: int) -> tuple[tuple[Record, int], HeldOut]:
-    """The last part of the motion held out; that of a released structure is run from the release."""
+    """The last part of the motion held out; that of a released structure is run from the release.
+
+    A structure that a force drives all the time and that hardly moves in that part, as a machine does that is held at
+    its goal, would tell nothing there: the last part of its way is held out instead.
+    """
     moving = span_of_motion(record).end
     end = int(round((1 - share) * moving))
+    if record.driven and drives_until(record) > end:
+        gone = way_gone(record[:moving])
+        if 1 - gone[end] < LITTLE * share:
+            record = record.noted(_STILL.format(f"{share:.0%}", 1 - gone[end], share))
+            end = int(np.searchsorted(gone, 1 - share))
     return (record, end), HeldOut(record[:moving], end, which)
