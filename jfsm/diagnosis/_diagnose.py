@@ -64,7 +64,8 @@ def diagnose(
     holdout : float, Record, sequence of Records, or None
         A share is the last part in time, unless what the model lacks shows only there: then it is the first. Where
         nothing drives the structure it is the last part of what is more than noise, run from the release; where it is
-        driven and hardly moves in the end, the last part of its way. Records are never fitted; None decides on the whole record and gives no gain.
+        driven and hardly moves in the end, the last part of its way. Records are never fitted; None decides on the
+        whole record and gives no gain.
     causes : sequence of ids, causes, laws or sensor effects, optional
         What to look for; the whole catalogue by default. Wrong own values always. Of many laws, those are fitted that
         explain most of the force that the model lacks. A law is a class, one of your own too, or an object, which is
