@@ -21,7 +21,7 @@ jax.config.update("jax_enable_x64", True)
 # ## The law
 #
 # `d` is the displacement towards the magnet [m]. The force of a term is positive where it resists a positive `d`; a
-# magnet helps, so its sign is negative. At rest it pulls with nothing: the constant part holds the plate where it hangs.
+# magnet helps, so its sign is negative. What it pulls at rest is held by the spring.
 
 
 # %%
