@@ -616,6 +616,13 @@ def test_no_probability_is_certain():
 
 
 def test_shares_and_numbers_keep_their_sign_and_size():
+    assert [percent(s) for s in (293.08, 100.0, 1e-9, -1e-9, -200.0)] == [
+        "> 10000 %",
+        "10000 %",
+        "< 0.001 %",
+        "> −0.001 %",
+        "< −10000 %",
+    ]
     assert [percent(s) for s in (0.997, 0.99999, 1.0, 0.0179, -0.3, 0.0, 1e-5, None)] == [
         "99.7 %",
         "99.9 %",

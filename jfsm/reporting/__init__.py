@@ -26,6 +26,7 @@ from ._plots import draw_surface as draw_surface
 from ._progress import bar as bar
 from ._progress import shown_by_default as shown_by_default
 from ._progress import stages as stages
+from ._quantities import MOST_PERCENT as MOST_PERCENT
 from ._shown_units import in_shown_unit as in_shown_unit
 from ._shown_units import said_as as said_as
 from ._shown_units import shown_in as shown_in

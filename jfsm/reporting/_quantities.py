@@ -112,12 +112,23 @@ def digits_for(value: float | None, low: float | None, high: float | None) -> in
     return min(max(3, 2 + math.floor(math.log10(abs(value))) - math.floor(math.log10(high - low))), 8)
 
 
+MOST_PERCENT, LEAST_PERCENT = 1e4, 1e-3
+"""Percentages beyond which only the bound is shown."""
+
+
 def percent(share: float | None) -> str:
-    """A share as a percentage; one decimal below ten and close below a hundred, where it matters."""
+    """A share as a percentage; one decimal below ten and close below a hundred, where it matters.
+
+    Shares that are too large or too small to mean more are bounds.
+    """
     if share is None or math.isnan(share):
         return ABSENT
     hundredths = 100.0 * share
     size = abs(hundredths)
+    if size > MOST_PERCENT:
+        return f"{'< −' if hundredths < 0 else '> '}{MOST_PERCENT:.0f} %"
+    if 0 < size < LEAST_PERCENT:
+        return f"< {LEAST_PERCENT:g} %" if hundredths > 0 else f"> −{LEAST_PERCENT:g} %"
     if 0 < size < 0.05:
         return f"{number(hundredths, 1)} %"
     if 99.5 <= size < 100.0:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from ...reporting import nearest, place_name, stopping_line
+from ...reporting import MOST_PERCENT, nearest, place_name, stopping_line
 from ...structures import Cause, causes
 from .._finding import Finding
 from ..advice.next_test import RIVAL
@@ -161,5 +161,11 @@ def _gained(gain: Gain | None, *, imposed: bool) -> str:
     if gain is None:
         return ""
     error = "error of the predicted force" if imposed else "free-run error"
-    refitted = f" ({gain.refitted:.2%} refitted)" if gain.beyond_refit else ""
-    return f" The {error} on held-out readings goes from {gain.before:.2%}{refitted} to {gain.after:.2%} of the signal."
+    refitted = f" ({_share(gain.refitted)} refitted)" if gain.beyond_refit else ""
+    to = f"to {_share(gain.after)} of the signal"
+    return f" The {error} on held-out readings goes from {_share(gain.before)}{refitted} {to}."
+
+
+def _share(error: float) -> str:
+    """An error as a share of the signal; a bound where it is so large that no more is said by it."""
+    return f"{error:.2%}" if error <= 0.01 * MOST_PERCENT else f"over {MOST_PERCENT:.0f}%"
