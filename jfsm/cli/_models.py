@@ -1,6 +1,5 @@
 """Commands about models: one made from numbers, and what may be in one."""
 
-import re
 from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
@@ -112,22 +111,22 @@ def compare(first: _Json, second: _Json) -> None:
 @command
 def terms(kind: _Name = None) -> None:
     """List what a model file may hold: kinds of terms and sensor effects, their parameters and formulas."""
-    from ..structures import SENSORS, TERMS
+    from ..structures import SENSORS, TERMS, formula_of
 
     if kind is not None:
         _show_kind(_found(kind, {each.kind: each for each in (*TERMS, *SENSORS)}, "kind", "terms"))
         return
     for title, places, classes in (("Terms", "between (i, j), 0 is ground", TERMS),
                                    ("Sensor effects", 'of a channel, ("force", 1)', SENSORS)):  # fmt: skip
-        rows = [(each.kind, f"{_with_units(each.parameters)}: {_formula(each)}") for each in classes]
+        rows = [(each.kind, f"{_with_units(each.parameters)}: {formula_of(each)}") for each in classes]
         show_table(f"{title}, {places}", ("kind", "parameters, what it is"), rows)
 
 
 def _show_kind(law: Any) -> None:
     """A kind in full, with its entry of a model file."""
-    from ..structures import AbstractTerm
+    from ..structures import AbstractTerm, formula_of
 
-    _show_parameters(f"{law.kind}: {_formula(law)}", law)
+    _show_parameters(f"{law.kind}: {formula_of(law)}", law)
     is_term = issubclass(law, AbstractTerm)
     key, at = ("term", "[0, 1]") if is_term else ("sensor", f'["{law.channels[0]}", 1]')
     numbers = "".join(f"{p.name} = 1.0\n" for p in law.parameters)
@@ -155,12 +154,13 @@ def causes(cause: _Name = None) -> None:
 def _show_cause(cause: "Cause") -> None:
     """A cause in full."""
     from ..diagnosis import confused_with
+    from ..structures import formula_of
 
     typer.echo(f"{cause.id} ({cause.family}): {cause.label}; {cause.sentence}.")
     if cause.sign:
         first = cause.effect.parameters[0].name
         typer.echo(f"{first} is {'positive' if cause.sign > 0 else 'negative'}.")
-    _show_parameters(_formula(cause.effect), cause.effect)
+    _show_parameters(formula_of(cause.effect), cause.effect)
     for words in confused_with(cause):
         typer.echo(f"{words}")
 
@@ -172,12 +172,6 @@ def _show_parameters(title: str, law: Any) -> None:
 
 def _with_units(parameters: Sequence[Any]) -> str:
     return ", ".join(p.name if p.unit() == "1" else f"{p.name} [{p.unit()}]" for p in parameters)
-
-
-def _formula(law: Any) -> str:
-    """The first paragraph of what a law says of itself, which holds its formula."""
-    words = " ".join((law.__doc__ or "").partition("\n\n")[0].split())
-    return re.sub(r",? \[\d+\]_( Eqs?\.( \(\d+\),?)*)?", "", words)
 
 
 def _found(name: str, known: Any, what: str, listing: str) -> Any:

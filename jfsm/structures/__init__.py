@@ -32,6 +32,7 @@ from ._term import AbstractFriction as AbstractFriction
 from ._term import AbstractTerm as AbstractTerm
 from ._term import Parameter as Parameter
 from ._term import Scale as Scale
+from ._written import formula_of as formula_of
 from .terms import DELAYED_TERMS as DELAYED_TERMS
 from .terms import FRICTION_TERMS as FRICTION_TERMS
 from .terms import MEMORY_TERMS as MEMORY_TERMS

@@ -320,6 +320,49 @@ class Structure(eqx.Module):
 
         return loads(text, Path("text"))
 
+    def to_python(self, path: str | Path | None = None, stick_speed: float | None = None) -> str:
+        """The equation of motion as a file of Python that needs NumPy and SciPy alone; written to `path` if given.
+
+        It holds every number by name with its unit, ``acceleration(t, q, v, force)``, and ``simulate(time, force)``.
+
+        Parameters
+        ----------
+        path : path, optional
+        stick_speed : float, optional
+            Speed [m/s] below which friction that sticks is smooth instead: its sliding force times tanh(w/stick_speed).
+            By default a thousandth of the speed of a mass that its springs can only just move against the friction.
+
+        Raises
+        ------
+        ValueError
+            If it moves by a function of yours, or has a map, a delay or a law whose operations no text is known of.
+
+        Warns
+        -----
+        UserWarning
+            Of what the file does otherwise than `simulate`: smooth friction, sensors that are left out. It says so,
+            too.
+        """
+        from .export import equations_of, exported, python_text
+
+        equations = equations_of(self, stick_speed)
+        return exported(equations, python_text(equations), path)
+
+    def to_matlab(self, path: str | Path | None = None, stick_speed: float | None = None) -> str:
+        """The equation of motion as a function file of MATLAB and Octave, for ``ode45``; as `to_python`.
+
+        The function is called as the file is, without its ending; ``equation_of_motion`` without a path.
+
+        Raises
+        ------
+        ValueError
+            As of `to_python`, and if MATLAB cannot call a function as the file is called.
+        """
+        from .export import equations_of, exported, function_name, matlab_text
+
+        equations = equations_of(self, stick_speed)
+        return exported(equations, matlab_text(equations, function_name(path)), path)
+
     @classmethod
     def load(cls, path: str | Path) -> "Structure":
         """Read a structure that `save` wrote, or one written by hand."""
