@@ -15,8 +15,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from test_terms import LAWS
+from typer.testing import CliRunner
 
 import jfsm
+from jfsm.cli import app
+from jfsm.diagnosis._finding import Finding
+from jfsm.diagnosis.report.found_table import found_table
 from jfsm.structures import AbstractFriction
 from jfsm.structures.terms import TERMS
 
@@ -268,3 +272,107 @@ def test_a_name_that_matlab_cannot_call_is_refused(name, tmp_path):
     with pytest.raises(ValueError, match=r"`path` must be a name that MATLAB can call, such as model\.m: .* got '"):
         sdof().to_matlab(tmp_path / name)
     assert not any(tmp_path.iterdir())
+
+
+def test_a_table_holds_the_force_of_a_link_over_displacement_and_velocity(tmp_path):
+    model = jfsm.Structure.chain([1.0, 1.0], [40.0, 7.0]) + jfsm.CubicStiffness(3.0, at=(1, 2))
+    model = model + jfsm.QuadraticDamping(2.0, at=(2, 1)) + jfsm.Preload(0.5, at=(2, 1))
+    d, w = np.array([-0.2, 0.0, 0.3]), np.array([-1.0, 2.0])
+    table = model.to_table(d, w, at=(1, 2), path=tmp_path / "force.csv")
+    assert table.terms == (
+        "stiffness@1-2",
+        "damping@1-2",
+        "cubic_stiffness@1-2",
+        "quadratic_damping@2-1",
+        "preload@2-1",
+    )
+    expected = 7 * d[:, None] + 3 * d[:, None] ** 3 + 2 * w * np.abs(w) + 0.5  # a load at (2, 1) pulls at 2
+    np.testing.assert_allclose(table.force, expected, rtol=1e-12)
+    frame = table.to_dataframe()
+    assert frame.loc[0.3, 2.0] == pytest.approx(expected[2, 1]) and frame.columns.name == "velocity"
+    assert (tmp_path / "force.csv").read_text().startswith("displacement,velocity,force\n")
+    rows = np.loadtxt(tmp_path / "force.csv", delimiter=",", skiprows=1)
+    np.testing.assert_array_equal(
+        rows, [[x, v, f] for i, x in enumerate(d) for v, f in zip(w, table.force[i], strict=True)]
+    )
+    assert repr(table).startswith("<ForceTable of stiffness@1-2, ") and "3 displacements, 2 velocities" in repr(table)
+
+
+def test_the_table_of_a_map_is_what_the_map_says():
+    states = np.random.default_rng(0).normal(size=(50, 2))
+    force_map = jfsm.Polynomial.fit(states, states @ [3.0, 0.5], order=1)
+    table = jfsm.Structure([1.0], [force_map.on(at=(0, 1))]).to_table([0.1, 0.2], [1.0])
+    np.testing.assert_allclose(table.force[:, 0], [0.8, 1.1], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("model", "at", "message"),
+    [
+        (sdof(jfsm.Maxwell(1.0, 0.1, at=(0, 1))), None, "maxwell@0-1 has a memory: its force is no table over"),
+        (sdof(jfsm.DelayedForce(1.0, 0.1, at=(0, 1))), None, "delayed_force@0-1 answers the motion of the past"),
+        (sdof(jfsm.StiffnessDrift(1.0, 0.1, at=(0, 1))), None, "stiffness_drift@0-1 changes with time"),
+        (
+            jfsm.Structure.chain([1, 1], [1, 1]),
+            None,
+            r"`at` must say which link .*; there are terms at \(0, 1\), \(1, 2",
+        ),
+        (sdof(), (0, 2), r"`at` must be a link that has a term; got \(0, 2\), there are terms at \[\(0, 1\)\]"),
+    ],
+)
+def test_what_is_no_table_is_refused_by_name(model, at, message):
+    with pytest.raises(ValueError, match=message):
+        model.to_table([0.0, 1.0], at=at)
+
+
+def test_the_table_of_a_diagnosis_is_of_what_was_found_over_the_motion_that_was_measured():
+    extended = jfsm.Structure.sdof(1.0, 40.0, 0.5) + jfsm.CubicStiffness(3.0, at=(0, 1))
+    finding = Finding("cubic_hardening", "stiffness", (0, 1), 0.99, {})
+    curves = {"residual": {"displacement": [0.1, -0.2], "velocity": [1.0, 3.0]}}
+    table = found_table(extended, [finding], lambda: curves, None, [0.0], None)
+    assert table.terms == ("cubic_stiffness@0-1",)
+    np.testing.assert_allclose(table.displacement[[0, -1]], [-0.2, 0.1])
+    np.testing.assert_allclose(table.force[:, 0], 3 * table.displacement**3, rtol=1e-12)
+    assert found_table(extended, [finding], lambda: curves, [0.0], None, None).velocity[-1] == 3.0
+    with pytest.raises(ValueError, match="There is no table: the diagnosis names no law that the model lacks"):
+        found_table(extended, [], lambda: curves, None, None, None)
+    with pytest.raises(ValueError, match="which JSON has no place for. Take the table of the diagnosis itself"):
+        found_table(None, [finding], lambda: curves, None, None, None)
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(app, ["export", *map(str, arguments)])
+
+
+def test_the_command_writes_what_the_ending_says(tmp_path):
+    model = tmp_path / "model.toml"
+    sdof(jfsm.Coulomb(2.0, at=(0, 1))).save(model)
+    done = invoke(model, "--out", tmp_path / "a.py", "--stick-speed", "1e-4")
+    assert done.exit_code == 0 and f"The model is in {tmp_path / 'a.py'}." in done.stdout
+    assert "friction that sticks (coulomb@0-1) is smooth here" in done.stderr
+    assert "stick_speed = 0.0001" in (tmp_path / "a.py").read_text(encoding="utf-8")
+    assert invoke(model, "--out", tmp_path / "a.m").exit_code == 0
+    assert (tmp_path / "a.m").read_text(encoding="utf-8").startswith("function dy = a(t, y, force, p)")
+    done = invoke(model, "--out", tmp_path / "a.csv", "--displacement=-0.1:0.1:3", "--velocity=-1:1:2")
+    assert done.exit_code == 0
+    force = np.loadtxt(tmp_path / "a.csv", delimiter=",", skiprows=1)[:, 2]
+    np.testing.assert_allclose(force, [-6, -2, -2, 2, 2, 6], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--out", "a.txt"], "--out must end in .py, .m or .csv; it was a.txt."),
+        (["--out", "a.csv"], "--displacement must be given for a table, as --displacement=-0.01:0.01:41."),
+        (["--out", "a.csv", "--displacement=1:2"], "--displacement must be LOW:HIGH:COUNT, as -0.01:0.01:41; it was"),
+        (["--out", "a.csv", "--displacement=0:1:999999999999"], "--displacement must have 1 to 10000 points; it was"),
+        (["--out", "a.csv", "--displacement=0:1:3", "--at", "0-2"], "--at must be a link that has a term; got (0, 2)"),
+        (["--out", "a.csv", "--displacement=0:nan:3"], "--displacement must be finite; 3 of 3 values are NaN"),
+        (["--out", "a-b.m"], "--out must be a name that MATLAB can call, such as model.m"),
+    ],
+)
+def test_the_command_refuses_in_its_own_words(tmp_path, monkeypatch, options, message):
+    monkeypatch.chdir(tmp_path)
+    sdof().save("model.toml")
+    done = invoke("model.toml", *options)
+    assert done.exit_code == 2 and message in " ".join(done.stderr.split())
+    assert [path.name for path in tmp_path.iterdir()] == ["model.toml"]

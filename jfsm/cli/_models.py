@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ._believed import load
 from ._command import command
-from ._input import check_outputs, option
-from ._output import show_table
+from ._input import check_outputs, link, option
+from ._laws import OwnLaws, run_laws
+from ._output import say, show_table
 
 if TYPE_CHECKING:
     from ..structures import Cause, Structure
@@ -87,6 +89,60 @@ def _numbers(name: str, text: str | None) -> list[float] | None:
         raise ValueError(
             f"--{name} must be a number, or numbers with commas between, as 1,2.5; it was {text!r}."
         ) from None
+
+
+_MOST_POINTS = 10_000
+"""Along one side of a table."""
+_Range = Annotated[str | None, option("Of a table: from, to, and how many: =-0.01:0.01:41.", "LOW:HIGH:COUNT")]
+
+
+@command
+def export(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="A model file, TOML.", show_default=False)],
+    out: Annotated[Path, option("Write this: .py for Python, .m for MATLAB, .csv for a table of a link's force.")],
+    stick_speed: Annotated[
+        float | None, option("Speed below which friction that sticks is smooth in .py and .m, in m/s.", "M/S")
+    ] = None,
+    at: Annotated[str | None, option("Link of the table: 0-1; the only one without it.", "I-J")] = None,
+    displacement: _Range = None,
+    velocity: _Range = None,
+    laws: OwnLaws = None,
+) -> None:
+    """Write a model as Python or MATLAB that needs no jfsm, or the force of a link as a table."""
+    from .._files import write_text_atomically
+    from ..structures import equations_of, function_name, matlab_text, python_text, table_of
+
+    check_outputs({"--out": out}, [model])
+    run_laws(laws)
+    structure, kind = load(model), out.suffix.lower()
+    if kind == ".csv":
+        if displacement is None:
+            raise ValueError("--displacement must be given for a table, as --displacement=-0.01:0.01:41.")
+        d, w = _axis("displacement", displacement), _axis("velocity", velocity or "0:0:1")
+        table_of(structure.terms, d, w, link(at)).write(out)
+    elif kind in (".py", ".m"):
+        equations = equations_of(structure, stick_speed)
+        text = python_text(equations) if kind == ".py" else matlab_text(equations, function_name(out))
+        write_text_atomically(out, text)
+        for note in equations.notes:
+            say(f"in {out}, {note}")
+    else:
+        raise ValueError(f"--out must end in .py, .m or .csv; it was {out}.")
+    typer.echo(f"The {'table' if kind == '.csv' else 'model'} is in {out}.")
+
+
+def _axis(name: str, text: str) -> Any:
+    """Equal steps from LOW:HIGH:COUNT."""
+    import numpy as np
+
+    try:
+        low, high, count = text.split(":")
+        ends, points = (float(low), float(high)), int(count)
+    except ValueError:
+        raise ValueError(f"--{name} must be LOW:HIGH:COUNT, as -0.01:0.01:41; it was {text!r}.") from None
+    if not 1 <= points <= _MOST_POINTS:
+        raise ValueError(f"--{name} must have 1 to {_MOST_POINTS} points; it was {text!r}.")
+    return np.linspace(*ends, points)
 
 
 _Name = Annotated[str | None, typer.Argument(metavar="NAME", help="Show this one alone, in full.", show_default=False)]

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import equinox as eqx
 import jax
@@ -18,6 +18,9 @@ from ._sensors import AbstractSensor
 from ._shown import structure_text
 from ._term import AbstractTerm, Parameter
 from .terms import LinearDamping, LinearStiffness
+
+if TYPE_CHECKING:
+    from .export import ForceTable
 
 MASS = Parameter("mass", force=1, length=-1, time=2, meaning="mass")
 
@@ -362,6 +365,38 @@ class Structure(eqx.Module):
 
         equations = equations_of(self, stick_speed)
         return exported(equations, matlab_text(equations, function_name(path)), path)
+
+    def to_table(
+        self, displacement: Any, velocity: Any = (0.0,), at: Any = None, path: str | Path | None = None
+    ) -> "ForceTable":
+        """Force of the terms at a link over its displacement and velocity; written to `path`, a csv, if given.
+
+        Friction that sticks is zero at zero velocity. A map is a guess where it has no readings.
+
+        Parameters
+        ----------
+        displacement, velocity : (n,), (m,) arrays
+            Of the link's ends, relative to each other.
+        at : (int, int), optional
+            The link; by default the only one that has a term.
+        path : path, optional
+
+        Returns
+        -------
+        ForceTable
+            Its ``displacement``, ``velocity``, ``force`` (n, m), ``to_dataframe()`` and ``write(path)``.
+
+        Raises
+        ------
+        ValueError
+            If no term is there, or one has a memory, a delay, or changes with time; names it.
+        """
+        from .export import table_of
+
+        table = table_of(self.terms, displacement, velocity, at)
+        if path is not None:
+            table.write(path)
+        return table
 
     @classmethod
     def load(cls, path: str | Path) -> "Structure":

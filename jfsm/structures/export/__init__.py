@@ -6,3 +6,5 @@ from .files import exported as exported
 from .files import function_name as function_name
 from .matlab import matlab_text as matlab_text
 from .python import python_text as python_text
+from .table import ForceTable as ForceTable
+from .table import table_of as table_of
