@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._types import require_x64
 from ..surrogates import RKPM, AbstractForceStateMap, Kriging
 
 try:
@@ -26,7 +25,6 @@ class _MapRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
     map_: AbstractForceStateMap
 
     def _readings(self, X: Any, y: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        require_x64()
         states, force = validate_data(
             self, X, y, dtype=np.float64, multi_output=True, y_numeric=True, ensure_min_samples=2
         )
@@ -34,7 +32,6 @@ class _MapRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator):
 
     def _asked(self, X: Any) -> NDArray[np.float64]:
         """States to predict at, once there is a map to ask."""
-        require_x64()
         check_is_fitted(self, "map_")
         return np.asarray(validate_data(self, X, dtype=np.float64, reset=False))
 

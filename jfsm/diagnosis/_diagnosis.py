@@ -112,12 +112,29 @@ class Diagnosis:
         with shown_in(out_units(units)):
             print_diagnosis(self.data)
 
-    def plot(self, units: OutUnits = None) -> Any:
-        """The pictures of the report as one matplotlib figure; `units` as of `print`."""
-        from ..reporting import plot_diagnosis, shown_in
+    def plot(self, ax: Any = None, units: OutUnits = None) -> Any:
+        """The pictures of the report as one matplotlib figure, or the force that the model lacks on axes of yours.
+
+        Parameters
+        ----------
+        ax : two matplotlib axes, optional
+            For that force over displacement and over velocity, with the law that was found.
+        units : optional
+            As of `print`.
+
+        Returns
+        -------
+        matplotlib figure, or the axes
+
+        Raises
+        ------
+        ValueError
+            If another number of axes is given, or the diagnosis holds no such force.
+        """
+        from ..reporting import plot_diagnosis, plot_force, shown_in
 
         with shown_in(out_units(units)):
-            return plot_diagnosis(self.data)
+            return plot_diagnosis(self.data) if ax is None else plot_force(self.data, ax)
 
     def table(
         self, displacement: Any = None, velocity: Any = None, at: Any = None, path: str | Path | None = None
