@@ -144,6 +144,14 @@ def test_a_notebook_shows_the_verdict_in_a_line(hidden_cubic):
     assert repr(hidden_cubic) == f"<Diagnosis, cause: {hidden_cubic.sentence}>"
 
 
+def test_the_force_that_was_found_is_a_table_and_a_program(hidden_cubic):
+    table = hidden_cubic.table(velocity=[0.0])
+    assert table.terms == ("cubic_stiffness@0-1",) and table.displacement.min() < 0 < table.displacement.max()
+    k3 = hidden_cubic.findings[0].parameters["k3"].value
+    np.testing.assert_allclose(table.force[:, 0], k3 * table.displacement**3, rtol=1e-9)
+    assert f"cubic_stiffness_0_1_k3 = {k3!r}" in hidden_cubic.extended.to_python()
+
+
 def test_a_diagnosis_is_read_back_from_its_json(hidden_cubic, tmp_path):
     hidden_cubic.to_json(tmp_path / "d.json")
     again = jfsm.Diagnosis.load(tmp_path / "d.json")

@@ -133,3 +133,19 @@ def test_a_curve_is_a_table():
     frame = curve().to_dataframe()
     assert list(frame) == ["frequency_hz", "amplitude_1", "phase_1", "stable"]
     assert frame["frequency_hz"][1] == pytest.approx(1 / np.pi)
+
+
+def test_a_notebook_shows_channels_and_values_with_their_units():
+    shown = record()._repr_html_()
+    assert "<td>displacement 2</td><td>m</td><td>-0.0009991</td><td>0.001</td>" in shown
+    assert "60 samples over 5.9 s" in shown
+    shown = response()._repr_html_()
+    assert "<td>velocity 1</td><td>m/s</td><td>-0.999" in shown and "force" not in shown
+    shown = fitted()._repr_html_()
+    assert "<td>stiffness@0-1.k</td><td>9</td><td>[8.1, 10.8]</td><td>N/m</td>" in shown
+    assert shown.startswith("<p>Fit of 2 values, converged</p><table>")
+
+
+def test_what_a_notebook_shows_of_a_name_is_no_markup():
+    named = jfsm.Record(time=TIME, displacement=np.sin(TIME), name="<script>")
+    assert "<script>" not in named._repr_html_()

@@ -21,6 +21,7 @@ from jfsm.reporting import (
     inspection_text,
     pictures,
     plot_diagnosis,
+    plot_force,
     print_diagnosis,
     print_inspection,
     render_page,
@@ -700,3 +701,14 @@ def test_showing_changes_nothing_in_the_dictionary():
     for show in (render_page, diagnosis_text, plot_diagnosis):
         show(d)
     assert d == before
+
+
+def test_the_force_is_drawn_on_axes_of_ones_own_with_units_and_the_law():
+    both = Figure().subplots(1, 2)
+    assert plot_force(diagnosis("cause"), both) is not None
+    assert both[0].get_xlabel().startswith("displacement [") and both[1].get_xlabel().startswith("velocity [")
+    assert both[0].lines and both[0].get_ylabel().startswith("residual force [")
+    with pytest.raises(ValueError, match="`ax` must be 2 axes, as plt.subplots"):
+        plot_force(diagnosis("cause"), both[0])
+    with pytest.raises(ValueError, match="`ax` must be left out: this diagnosis holds no force"):
+        plot_force({**diagnosis("cause"), "curves": None}, both)

@@ -12,7 +12,7 @@ import pytest
 import jfsm
 
 DOCS = pages.ROOT / "docs"
-QUICK = ("how-to/records.md",)
+QUICK = ("how-to/records.md", "how-to/export.md")
 SLOW = (
     *(f"tutorials/{name}.md" for name in ("decay", "shaker", "damper", "robot", "own-simulation")),
     *(f"how-to/{name}.md" for name in ("maps", "analysis", "black-boxes")),
@@ -23,6 +23,7 @@ NEEDED = ("mkdocs", "material", "mkdocstrings_handlers", "nbconvert")
 @pytest.mark.parametrize("page", [*QUICK, *(pytest.param(page, marks=pytest.mark.slow) for page in SLOW)])
 def test_the_python_of_a_page_runs_and_ends_as_the_page_says(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)  # what a page writes it may import
     pages.run(DOCS / page)
 
 

@@ -1,6 +1,5 @@
 """Commands about models: one made from numbers, and what may be in one."""
 
-import re
 from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
@@ -8,9 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ._believed import load
 from ._command import command
-from ._input import check_outputs, option
-from ._output import show_table
+from ._input import check_outputs, link, option
+from ._laws import OwnLaws, run_laws
+from ._output import say, show_table
 
 if TYPE_CHECKING:
     from ..structures import Cause, Structure
@@ -90,6 +91,60 @@ def _numbers(name: str, text: str | None) -> list[float] | None:
         ) from None
 
 
+_MOST_POINTS = 10_000
+"""Along one side of a table."""
+_Range = Annotated[str | None, option("Of a table: from, to, and how many: =-0.01:0.01:41.", "LOW:HIGH:COUNT")]
+
+
+@command
+def export(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="A model file, TOML.", show_default=False)],
+    out: Annotated[Path, option("Write this: .py for Python, .m for MATLAB, .csv for a table of a link's force.")],
+    stick_speed: Annotated[
+        float | None, option("Speed below which friction that sticks is smooth in .py and .m, in m/s.", "M/S")
+    ] = None,
+    at: Annotated[str | None, option("Link of the table: 0-1; the only one without it.", "I-J")] = None,
+    displacement: _Range = None,
+    velocity: _Range = None,
+    laws: OwnLaws = None,
+) -> None:
+    """Write a model as Python or MATLAB that needs no jfsm, or the force of a link as a table."""
+    from .._files import write_text_atomically
+    from ..structures import equations_of, function_name, matlab_text, python_text, table_of
+
+    check_outputs({"--out": out}, [model])
+    run_laws(laws)
+    structure, kind = load(model), out.suffix.lower()
+    if kind == ".csv":
+        if displacement is None:
+            raise ValueError("--displacement must be given for a table, as --displacement=-0.01:0.01:41.")
+        d, w = _axis("displacement", displacement), _axis("velocity", velocity or "0:0:1")
+        table_of(structure.terms, d, w, link(at)).write(out)
+    elif kind in (".py", ".m"):
+        equations = equations_of(structure, stick_speed)
+        text = python_text(equations) if kind == ".py" else matlab_text(equations, function_name(out))
+        write_text_atomically(out, text)
+        for note in equations.notes:
+            say(f"in {out}, {note}")
+    else:
+        raise ValueError(f"--out must end in .py, .m or .csv; it was {out}.")
+    typer.echo(f"The {'table' if kind == '.csv' else 'model'} is in {out}.")
+
+
+def _axis(name: str, text: str) -> Any:
+    """Equal steps from LOW:HIGH:COUNT."""
+    import numpy as np
+
+    try:
+        low, high, count = text.split(":")
+        ends, points = (float(low), float(high)), int(count)
+    except ValueError:
+        raise ValueError(f"--{name} must be LOW:HIGH:COUNT, as -0.01:0.01:41; it was {text!r}.") from None
+    if not 1 <= points <= _MOST_POINTS:
+        raise ValueError(f"--{name} must have 1 to {_MOST_POINTS} points; it was {text!r}.")
+    return np.linspace(*ends, points)
+
+
 _Name = Annotated[str | None, typer.Argument(metavar="NAME", help="Show this one alone, in full.", show_default=False)]
 
 
@@ -112,22 +167,22 @@ def compare(first: _Json, second: _Json) -> None:
 @command
 def terms(kind: _Name = None) -> None:
     """List what a model file may hold: kinds of terms and sensor effects, their parameters and formulas."""
-    from ..structures import SENSORS, TERMS
+    from ..structures import SENSORS, TERMS, formula_of
 
     if kind is not None:
         _show_kind(_found(kind, {each.kind: each for each in (*TERMS, *SENSORS)}, "kind", "terms"))
         return
     for title, places, classes in (("Terms", "between (i, j), 0 is ground", TERMS),
                                    ("Sensor effects", 'of a channel, ("force", 1)', SENSORS)):  # fmt: skip
-        rows = [(each.kind, f"{_with_units(each.parameters)}: {_formula(each)}") for each in classes]
+        rows = [(each.kind, f"{_with_units(each.parameters)}: {formula_of(each)}") for each in classes]
         show_table(f"{title}, {places}", ("kind", "parameters, what it is"), rows)
 
 
 def _show_kind(law: Any) -> None:
     """A kind in full, with its entry of a model file."""
-    from ..structures import AbstractTerm
+    from ..structures import AbstractTerm, formula_of
 
-    _show_parameters(f"{law.kind}: {_formula(law)}", law)
+    _show_parameters(f"{law.kind}: {formula_of(law)}", law)
     is_term = issubclass(law, AbstractTerm)
     key, at = ("term", "[0, 1]") if is_term else ("sensor", f'["{law.channels[0]}", 1]')
     numbers = "".join(f"{p.name} = 1.0\n" for p in law.parameters)
@@ -155,12 +210,13 @@ def causes(cause: _Name = None) -> None:
 def _show_cause(cause: "Cause") -> None:
     """A cause in full."""
     from ..diagnosis import confused_with
+    from ..structures import formula_of
 
     typer.echo(f"{cause.id} ({cause.family}): {cause.label}; {cause.sentence}.")
     if cause.sign:
         first = cause.effect.parameters[0].name
         typer.echo(f"{first} is {'positive' if cause.sign > 0 else 'negative'}.")
-    _show_parameters(_formula(cause.effect), cause.effect)
+    _show_parameters(formula_of(cause.effect), cause.effect)
     for words in confused_with(cause):
         typer.echo(f"{words}")
 
@@ -172,12 +228,6 @@ def _show_parameters(title: str, law: Any) -> None:
 
 def _with_units(parameters: Sequence[Any]) -> str:
     return ", ".join(p.name if p.unit() == "1" else f"{p.name} [{p.unit()}]" for p in parameters)
-
-
-def _formula(law: Any) -> str:
-    """The first paragraph of what a law says of itself, which holds its formula."""
-    words = " ".join((law.__doc__ or "").partition("\n\n")[0].split())
-    return re.sub(r",? \[\d+\]_( Eqs?\.( \(\d+\),?)*)?", "", words)
 
 
 def _found(name: str, known: Any, what: str, listing: str) -> Any:

@@ -72,11 +72,9 @@ class Sides:
         return pd.DataFrame([dict(_columns(row)) for row in self.rows])
 
     def _repr_html_(self) -> str:
-        from html import escape
+        from ..reporting import notebook_table
 
-        lines = [("", *self.names, "unit", ""), *self.cells()]
-        rows = ("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in line) + "</tr>" for line in lines)
-        return f"<table>{''.join(rows)}</table>"
+        return notebook_table("", ("", *self.names, "unit", ""), self.cells())
 
 
 def compare(first: Diagnosis | Record, second: Diagnosis | Record) -> Sides:

@@ -11,7 +11,7 @@ import jax
 from .._result import Estimate
 from ..identification import Mode
 from ..records import OutUnits, out_units
-from ..structures import Structure, causes
+from ..structures import ForceTable, Structure, causes
 from ._finding import CandidateResult, Finding
 from .advice.next_test import Leading, Proposal, proposals
 from .evidence.free_runs import Gain
@@ -112,12 +112,55 @@ class Diagnosis:
         with shown_in(out_units(units)):
             print_diagnosis(self.data)
 
-    def plot(self, units: OutUnits = None) -> Any:
-        """The pictures of the report as one matplotlib figure; `units` as of `print`."""
-        from ..reporting import plot_diagnosis, shown_in
+    def plot(self, ax: Any = None, units: OutUnits = None) -> Any:
+        """The pictures of the report as one matplotlib figure, or the force that the model lacks on axes of yours.
+
+        Parameters
+        ----------
+        ax : two matplotlib axes, optional
+            For that force over displacement and over velocity, with the law that was found.
+        units : optional
+            As of `print`.
+
+        Returns
+        -------
+        matplotlib figure, or the axes
+
+        Raises
+        ------
+        ValueError
+            If another number of axes is given, or the diagnosis holds no such force.
+        """
+        from ..reporting import plot_diagnosis, plot_force, shown_in
 
         with shown_in(out_units(units)):
-            return plot_diagnosis(self.data)
+            return plot_diagnosis(self.data) if ax is None else plot_force(self.data, ax)
+
+    def table(
+        self, displacement: Any = None, velocity: Any = None, at: Any = None, path: str | Path | None = None
+    ) -> ForceTable:
+        """The force that was found over displacement and velocity: of the named laws, or of the map; the model's own
+        terms are not in it. Written to `path`, a csv, if given.
+
+        Parameters
+        ----------
+        displacement, velocity : (n,), (m,) arrays, optional
+            By default over the range of the motion that was measured.
+        at : (int, int), optional
+            The link; by default the only one where something was found.
+        path : path, optional
+
+        Raises
+        ------
+        ValueError
+            If no force was found, or it is no function of displacement and velocity; see `Structure.to_table`.
+        """
+        from .report.found_table import found_table
+
+        table = found_table(self.extended, self.findings, lambda: self.data["curves"], displacement, velocity, at)
+        if path is not None:
+            table.write(path)
+        return table
 
     def report(self, path: str | Path, units: OutUnits = None) -> None:
         """Write a self-contained HTML page; the file appears whole or not at all. `units` as of `print`."""

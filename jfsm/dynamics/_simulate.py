@@ -132,6 +132,13 @@ class Response:
         end = f"escaped at {self.escape_time:.6g} s" if self.escape_time is not None else f"{self.time[-1]:.6g} s"
         return f"<Response, {n} samples of {dof} degree{'s' * (dof > 1)} of freedom, {end}, {self.solver} solver>"
 
+    def _repr_html_(self) -> str:
+        """The motion's sizes, for a notebook."""
+        from ..reporting import channel_table
+
+        named = ((f"{kind} {j + 1}", unit, y[:, j]) for kind, unit, y in self._motion() for j in range(y.shape[1]))
+        return channel_table(repr(self).strip("<>"), named)
+
     def plot(self, ax: Any = None) -> Any:
         """Displacement, velocity and acceleration over time, and the force where motion drives.
 
@@ -146,14 +153,17 @@ class Response:
         """
         from ..reporting import Line, PanelOf, draw_panels
 
-        si = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2", "force": "N"}
-        units, panels = si if self._record is None else {**si, **self._record.units}, []
-        for kind in si:
-            values = getattr(self, kind)
-            if values is not None:
-                lines = [Line(f"{kind} {j + 1}", self.time, values[:, j]) for j in range(values.shape[1])]
-                panels.append(PanelOf("time [s]", f"{kind} [{units[kind]}]", lines))
+        panels = []
+        for kind, unit, values in self._motion():
+            lines = [Line(f"{kind} {j + 1}", self.time, values[:, j]) for j in range(values.shape[1])]
+            panels.append(PanelOf("time [s]", f"{kind} [{unit}]", lines))
         return draw_panels(panels, ax)
+
+    def _motion(self) -> list[tuple[str, str, Any]]:
+        """What there is of motion and force, each with its unit."""
+        si = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2", "force": "N"}
+        units = si if self._record is None else {**si, **self._record.units}
+        return [(kind, units[kind], getattr(self, kind)) for kind in si if getattr(self, kind) is not None]
 
     def to_dataframe(self) -> Any:
         """The motion as a DataFrame of pandas, which must be installed, over the instants [s]."""

@@ -80,6 +80,19 @@ class Fit:
     def __repr__(self) -> str:
         return f"<Fit, {len(self.values)} values, {self.result.value}>\n{self.structure!r}"
 
+    def _repr_html_(self) -> str:
+        """The values with their intervals and units, for a notebook."""
+        from ..reporting import notebook_table
+
+        parameters = self.structure.entries()
+        rows = []
+        for path, value in self.values.items():
+            low, high = self.intervals[path]
+            unit = parameters[path][0].unit() if path in parameters else ""
+            rows.append((path, f"{value:.6g}", f"[{low:.6g}, {high:.6g}]", unit))
+        caption = f"Fit of {len(self.values)} values, {self.result.value}"
+        return notebook_table(caption, ("value", "fitted", "95 % interval", "unit"), rows)
+
     def to_dataframe(self) -> Any:
         """Value, 95 % interval and unit by path, as a DataFrame of pandas, which must be installed."""
         import pandas as pd

@@ -98,6 +98,13 @@ class Record(AbstractRecord):
             panels.append(PanelOf(f"time [{self.units.get('time', 's')}]", words, lines))
         return draw_panels(panels, ax)
 
+    def _repr_html_(self) -> str:
+        """The channels with their units and sizes, for a notebook."""
+        from jfsm.reporting import channel_table
+
+        named = ((f"{kind.replace('_', ' ')} {j}", self.units[kind], y) for (kind, j), y in self.channels.items())
+        return channel_table(repr(self).strip("<>"), named)
+
     def inspect(self) -> Inspection:
         """What an engineer would want to know of the record before trusting it."""
         return inspect(self)

@@ -13,11 +13,14 @@ from ._force_map_page import render_force_map as render_force_map
 from ._inspection_page import render_inspection as render_inspection
 from ._inspection_pictures import inspection_pictures as inspection_pictures
 from ._listing_page import render_listing as render_listing
+from ._notebook import channel_table as channel_table
+from ._notebook import notebook_table as notebook_table
 from ._page import render_page as render_page
 from ._page_again import read_diagnosis as read_diagnosis
 from ._page_again import render_json as render_json
 from ._pictures import pictures as pictures
 from ._pictures import plot_diagnosis as plot_diagnosis
+from ._pictures import plot_force as plot_force
 from ._plots import Line as Line
 from ._plots import PanelOf as PanelOf
 from ._plots import draw_intervals as draw_intervals

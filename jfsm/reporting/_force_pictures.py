@@ -33,10 +33,21 @@ def draw_residual(
 
     A line has a band where its error is given.
     """
+    both = [figure.add_subplot(1, 2, place) for place in (1, 2)]
+    draw_residual_on(both, residual, law, name, line_name)
+
+
+def draw_residual_on(
+    both: Sequence[Axes],
+    residual: Mapping[str, Any],
+    law: Mapping[str, Any] | None,
+    name: str = RESIDUAL,
+    line_name: str = LAW,
+) -> None:
+    """`draw_residual` on two axes."""
     force, units = curve(residual["force"]), residual.get("unit") or {}
     force_scale = scale_for(peak(force), units.get("force"))
-    for place, (axis, other) in enumerate(AXES.items(), start=1):
-        axes = figure.add_subplot(1, 2, place)
+    for axes, (axis, other) in zip(both, AXES.items(), strict=True):
         scale = scale_for(peak(curve(residual[axis])), units.get(axis))
         points = curve(residual[axis]) / scale.factor, force / force_scale.factor
         _draw_points(axes, *points, curve(residual[other]), other)

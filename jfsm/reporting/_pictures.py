@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from jfsm.reporting._canvas import house_style
 from jfsm.reporting._course_picture import describe_course, draw_course
 from jfsm.reporting._curves import first_channels
-from jfsm.reporting._force_pictures import describe_map, describe_residual, draw_map, draw_residual
+from jfsm.reporting._force_pictures import describe_map, describe_residual, draw_map, draw_residual, draw_residual_on
+from jfsm.reporting._plots import axes_for
 from jfsm.reporting._quantities import percent
 from jfsm.reporting._record_picture import describe_record, draw_record
 from jfsm.reporting._score_pictures import describe_gain, describe_ranking, draw_gain, draw_ranking, ranked_size
@@ -55,6 +56,23 @@ def plot_diagnosis(d: Mapping[str, Any]) -> Figure:
             sheet.suptitle(sketch.title, x=0.01, ha="left", fontweight="bold")
             sketch.draw(sheet)
     return figure
+
+
+def plot_force(d: Mapping[str, Any], ax: Any) -> Any:
+    """The two axes with the force that the model lacks over displacement and velocity, and the law that was found.
+
+    Raises
+    ------
+    ValueError
+        If `d` is not the dictionary of a diagnosis, or holds no such force, or `ax` is not two axes.
+    """
+    checked_verdict(d)
+    axes, curves = axes_for(2, ax), d.get("curves") or {}
+    residual = curves.get("residual")
+    if not residual or not residual.get("force"):
+        raise ValueError("`ax` must be left out: this diagnosis holds no force to draw on axes.")
+    draw_residual_on(list(axes), residual, curves.get("law"))
+    return axes
 
 
 def _what_runs(holdout: Mapping[str, Any]) -> str:

@@ -32,6 +32,13 @@ from ._term import AbstractFriction as AbstractFriction
 from ._term import AbstractTerm as AbstractTerm
 from ._term import Parameter as Parameter
 from ._term import Scale as Scale
+from ._written import formula_of as formula_of
+from .export import ForceTable as ForceTable
+from .export import equations_of as equations_of
+from .export import function_name as function_name
+from .export import matlab_text as matlab_text
+from .export import python_text as python_text
+from .export import table_of as table_of
 from .terms import DELAYED_TERMS as DELAYED_TERMS
 from .terms import FRICTION_TERMS as FRICTION_TERMS
 from .terms import MEMORY_TERMS as MEMORY_TERMS

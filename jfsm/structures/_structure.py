@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import equinox as eqx
 import jax
@@ -18,6 +18,9 @@ from ._sensors import AbstractSensor
 from ._shown import structure_text
 from ._term import AbstractTerm, Parameter
 from .terms import LinearDamping, LinearStiffness
+
+if TYPE_CHECKING:
+    from .export import ForceTable
 
 MASS = Parameter("mass", force=1, length=-1, time=2, meaning="mass")
 
@@ -319,6 +322,81 @@ class Structure(eqx.Module):
         from ._toml import loads
 
         return loads(text, Path("text"))
+
+    def to_python(self, path: str | Path | None = None, stick_speed: float | None = None) -> str:
+        """The equation of motion as a file of Python that needs NumPy and SciPy alone; written to `path` if given.
+
+        It holds every number by name with its unit, ``acceleration(t, q, v, force)``, and ``simulate(time, force)``.
+
+        Parameters
+        ----------
+        path : path, optional
+        stick_speed : float, optional
+            Speed [m/s] below which friction that sticks is smooth instead: its sliding force times tanh(w/stick_speed).
+            By default a thousandth of the speed of a mass that its springs can only just move against the friction.
+
+        Raises
+        ------
+        ValueError
+            If it moves by a function of yours, or has a map, a delay or a law whose operations no text is known of.
+
+        Warns
+        -----
+        UserWarning
+            Of what the file does otherwise than `simulate`: smooth friction, sensors that are left out. It says so,
+            too.
+        """
+        from .export import equations_of, exported, python_text
+
+        equations = equations_of(self, stick_speed)
+        return exported(equations, python_text(equations), path)
+
+    def to_matlab(self, path: str | Path | None = None, stick_speed: float | None = None) -> str:
+        """The equation of motion as a function file of MATLAB and Octave, for ``ode45``; as `to_python`.
+
+        The function is called as the file is, without its ending; ``equation_of_motion`` without a path.
+
+        Raises
+        ------
+        ValueError
+            As of `to_python`, and if MATLAB cannot call a function as the file is called.
+        """
+        from .export import equations_of, exported, function_name, matlab_text
+
+        equations = equations_of(self, stick_speed)
+        return exported(equations, matlab_text(equations, function_name(path)), path)
+
+    def to_table(
+        self, displacement: Any, velocity: Any = (0.0,), at: Any = None, path: str | Path | None = None
+    ) -> "ForceTable":
+        """Force of the terms at a link over its displacement and velocity; written to `path`, a csv, if given.
+
+        Friction that sticks is zero at zero velocity. A map is a guess where it has no readings.
+
+        Parameters
+        ----------
+        displacement, velocity : (n,), (m,) arrays
+            Of the link's ends, relative to each other.
+        at : (int, int), optional
+            The link; by default the only one that has a term.
+        path : path, optional
+
+        Returns
+        -------
+        ForceTable
+            Its ``displacement``, ``velocity``, ``force`` (n, m), ``to_dataframe()`` and ``write(path)``.
+
+        Raises
+        ------
+        ValueError
+            If no term is there, or one has a memory, a delay, or changes with time; names it.
+        """
+        from .export import table_of
+
+        table = table_of(self.terms, displacement, velocity, at)
+        if path is not None:
+            table.write(path)
+        return table
 
     @classmethod
     def load(cls, path: str | Path) -> "Structure":

@@ -1,5 +1,6 @@
 """A term or a sensor effect as it would be written in Python."""
 
+import re
 from typing import Any
 
 import equinox as eqx
@@ -14,3 +15,9 @@ def part_text(part: Any) -> str:
         return eqx.tree_pformat(part)
     words = ", ".join(f"{p.name}={float(number):.6g}" for p, number in zip(part.parameters, numbers, strict=True))
     return f"{type(part).__name__}({words}, at={part.at})"
+
+
+def formula_of(law: Any) -> str:
+    """The first paragraph of what the class of a law says of itself, which holds its formula, without references."""
+    words = " ".join((law.__doc__ or "").partition("\n\n")[0].split())
+    return re.sub(r",? \[\d+\]_( Eqs?\.( \(\d+\),?)*)?", "", words)

@@ -167,12 +167,13 @@ COMMANDS = {
     "diagnose": "{record} --model {model}", "map": "{record} --model {model}", "batch": "{record} --model {model} --out {out}",
     "why": "{json}", "report": "{json} --report {out}", "compare": "{json} {json}", "verify": "{json} {record}",
     "model": "--mass {value} --stiffness {value}", "terms": "{value}", "causes": "{value}",
+    "export": "{model} --out {out}",
 }  # fmt: skip
 OPTIONS = (
     "--force --displacement --velocity --acceleration --base-acceleration --time --rate --unit --where --sensitivity --run "
     "--sheet --since --until --resample --every --at-rest --drive --report --json --extended --out --out-units --holdout "
     "--cause --laws --joints --max-causes --time-limit --key --fixed --mass --at --method --order --simulated --jobs --with "
-    "--damping --frequency --damping-ratio --nothing"
+    "--damping --frequency --damping-ratio --stick-speed --nothing"
 ).split()  # fmt: skip
 VALUES = (
     "a 0 -1 1.5 nan inf 1e400 1000000000000 force_1 displacement_1 2=force_1 1000000000000=displacement_1 0=force_1 time run.csv "
