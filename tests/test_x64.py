@@ -57,7 +57,7 @@ def answers() -> dict[str, str]:
         text=True,
         cwd=Path(__file__).resolve().parents[1],
         env=environment,
-        timeout=120,
+        timeout=600,
     )
     assert run.returncode == 0, run.stderr
     return dict(line.split(": ", 1) for line in run.stdout.splitlines())

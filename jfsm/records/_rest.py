@@ -77,7 +77,12 @@ def way_gone(record: AbstractRecord) -> NDArray[np.float64]:
 
 
 def drives_until(record: AbstractRecord) -> int:
-    """Samples until every force channel shows no more than noise about its last level; 0 without a force."""
+    """Samples until every force channel shows no more than noise about its last level.
+
+    0 without a force, and of a record that is too short to tell.
+    """
+    if len(record) < 2 * BLOCKS:
+        return 0
     forces = [y for (kind, _), y in record.channels.items() if kind == "force" and np.ptp(y) > 0]
     return max((_loud_until(y, noise_floor(y, record.dt).std) for y in forces), default=0)
 
