@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+import jfsm
 from jfsm.records import Record
 from jfsm.records._comparison import Reading, compare
-from jfsm.records._polarity import is_inverted
+from jfsm.records._polarity import is_inverted, polarity
 
 DT, N = 0.01, 3000
 T = DT * np.arange(N)
@@ -181,3 +182,10 @@ def test_nothing_is_said_of_the_sign_of_a_force_under_a_single_line_or_without_a
     assert not is_inverted(-one["force"], one["displacement"], 0, DT, 0.8)
     strange = np.random.default_rng(4).standard_normal(N)
     assert not is_inverted(strange, one["displacement"], 0, DT, 0.8)
+
+
+def test_a_motion_that_the_force_does_not_drive_tells_nothing_of_its_sign():
+    t = np.arange(3000) / 100
+    motion = np.sin(9 * t) + 0.01 * np.random.default_rng(0).standard_normal(t.size)
+    assert polarity(np.sin(3 * t), motion, 0, 0.01, 9 / (2 * np.pi)) == 0.0
+    assert jfsm.Record(time=t, force=np.sin(3 * t), displacement=motion).inspect().findings is not None

@@ -392,7 +392,7 @@ def test_the_gain_is_shown_with_its_interval():
 
 def test_every_picture_says_in_words_what_it_shows():
     labels = Page(render_page(diagnosis("cause"))).labels
-    assert len(labels) == 5
+    assert len(labels) == 6
     assert any("rms error" in label and "as given" in label and "mm" in label for label in labels)
     assert any("Map of the residual force" in label for label in labels)
 

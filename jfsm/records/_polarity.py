@@ -23,7 +23,8 @@ def is_inverted(force: Samples, motion: Samples, derivative: int, dt: float, fre
 def polarity(force: Samples, motion: Samples, derivative: int, dt: float, frequency: float) -> float:
     """Standard errors by which the mass or the stiffness that a force seems to move is above zero, whichever is more.
 
-    It is far below zero where both are negative, and 0 where the two cannot be told apart.
+    It is far below zero where both are negative, and 0 where the two cannot be told apart, or the force drives nothing
+    of the motion.
 
     Parameters
     ----------
@@ -53,6 +54,8 @@ def polarity(force: Samples, motion: Samples, derivative: int, dt: float, freque
     strength[:3] = pushed[:3] = 0.0
     # What moves without being pushed, as the harmonics that a nonlinear spring makes, tells nothing.
     peak = (strength > PEAK * strength.max()) & (pushed > PUSHED * pushed.max())
+    if not np.any(peak):
+        return 0.0
     flat = 1.0 / np.sqrt(strength[peak])  # so that the flanks, which tell mass from stiffness, count as the peak does
     columns = np.stack([_real(flat * y[:, peak]) for y in (a, v, x)], axis=1)
     target = _real(flat * pushes[:, peak])
