@@ -59,6 +59,7 @@ from .structures import DampingDrift as DampingDrift
 from .structures import DeadZone as DeadZone
 from .structures import DelayedForce as DelayedForce
 from .structures import DoubleWell as DoubleWell
+from .structures import ElasticJoint as ElasticJoint
 from .structures import EndStop as EndStop
 from .structures import ForceDelay as ForceDelay
 from .structures import ForceGain as ForceGain

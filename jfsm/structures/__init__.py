@@ -51,6 +51,7 @@ from .terms import DampingDrift as DampingDrift
 from .terms import DeadZone as DeadZone
 from .terms import DelayedForce as DelayedForce
 from .terms import DoubleWell as DoubleWell
+from .terms import ElasticJoint as ElasticJoint
 from .terms import EndStop as EndStop
 from .terms import FreePlay as FreePlay
 from .terms import Iwan as Iwan

@@ -6,6 +6,7 @@ from itertools import chain
 from ..._threads import side_by_side
 from ...estimation import Latent
 from ...identification import Nuisances
+from ...records import Record
 from ...structures import (
     AbstractSensor,
     AbstractTerm,
@@ -53,6 +54,16 @@ def chosen_causes(selection: Iterable[CauseLike] | CauseLike | None) -> dict[str
             examples = found[cause.id].examples + cause.examples if cause.id in found else cause.examples
             found[cause.id] = cause._replace(examples=examples)
     return {name: cause for name, cause in found.items() if not cause.is_value}
+
+
+def asked_for(
+    selection: Iterable[CauseLike] | CauseLike | None, model: Structure, records: Sequence[Record]
+) -> Iterable[CauseLike] | CauseLike:
+    """What is looked for: by default the whole catalogue, without laws of joints where there can be none."""
+    if selection is not None:
+        return selection
+    joints = model.own is not None or any(record.units["displacement"] == "rad" for record in records)
+    return [cause for cause in causes().values() if joints or not getattr(cause.effect, "of_joints", False)]
 
 
 def candidates(

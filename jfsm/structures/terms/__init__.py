@@ -11,6 +11,7 @@ from .hysteresis import Jenkins as Jenkins
 from .linear import LinearDamping as LinearDamping
 from .linear import LinearStiffness as LinearStiffness
 from .linear_memory import AttachedOscillator as AttachedOscillator
+from .linear_memory import ElasticJoint as ElasticJoint
 from .linear_memory import Maxwell as Maxwell
 from .load import PeriodicDisturbance as PeriodicDisturbance
 from .load import Preload as Preload
@@ -50,7 +51,7 @@ SMOOTH_TERMS = (
 FRICTION_TERMS = (Coulomb, CoulombAsymmetric, Stribeck)
 """Laws that stick."""
 
-MEMORY_TERMS = (BoucWen, Jenkins, LuGre, FreePlay, Maxwell, AttachedOscillator)
+MEMORY_TERMS = (BoucWen, Jenkins, LuGre, FreePlay, Maxwell, AttachedOscillator, ElasticJoint)
 """Laws with at most two hidden states."""
 
 DELAYED_TERMS = (DelayedForce,)
