@@ -80,6 +80,7 @@ from .structures import Preload as Preload
 from .structures import QuadraticDamping as QuadraticDamping
 from .structures import QuadraticStiffness as QuadraticStiffness
 from .structures import QuinticStiffness as QuinticStiffness
+from .structures import Ripple as Ripple
 from .structures import Saturation as Saturation
 from .structures import Scale as Scale
 from .structures import Simulation as Simulation

@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import jfsm
@@ -103,7 +104,7 @@ def test_joints_are_looked_for_unasked_where_something_turns_or_a_simulation_mov
 
     assert "elastic_joint" in ids(None, rigid(), [turning])
     assert "elastic_joint" in ids(None, simulated, [straight])
-    assert ids(None, rigid(), [turning]) - ids(None, rigid(), [straight]) == {"elastic_joint"}
+    assert ids(None, rigid(), [turning]) - ids(None, rigid(), [straight]) == {"elastic_joint", "ripple"}
     assert ids(["elastic_joint"], rigid(), [straight]) == {"elastic_joint"}
 
 
@@ -119,4 +120,42 @@ def test_an_elastic_gear_is_named_with_its_stiffness():
     [found] = d.findings
     assert (found.cause, found.at) == ("elastic_joint", (0, 1)) and found.probability > 0.9
     for name, right, share in (("k", GEAR, 0.03), ("m", LINK, 0.03)):
+        assert found.parameters[name].value == pytest.approx(right, rel=share)
+
+
+RIPPLE, TEETH, PHASE = 0.12, 14.0, 0.7
+"""Amplitude [N m] of a cogging torque, how often it comes back in a turn, and its phase."""
+
+
+def with_teeth(g: np.ndarray) -> np.ndarray:
+    """Angle of a rigid joint whose motor has teeth, by SciPy."""
+
+    def rates(t, y):
+        drive = np.interp(t, TIME, g)
+        held = WEIGHT * y[0] + DRAG * y[1] + RIPPLE * np.sin(TEETH * y[0] + PHASE)
+        return [y[1], (drive - held) / (ROTOR + LINK)]
+
+    return solve_ivp(rates, (0, TIME[-1]), [0, 0], t_eval=TIME, rtol=1e-8, atol=1e-10, max_step=TIME[1]).y[0]
+
+
+def test_a_ripple_is_the_force_of_teeth():
+    g = torque(2, highest=5.0)
+    exact = with_teeth(g)
+    model = jfsm.causes()["ripple"].apply(rigid(), at=(0, 1), A=RIPPLE, n=TEETH, phase=PHASE)
+    run = jfsm.simulate(model, record(exact, g), reconstruction="linear").displacement
+    np.testing.assert_allclose(np.asarray(run)[:, 0], exact, atol=1e-4 * np.max(np.abs(exact)))
+
+
+@pytest.mark.slow
+def test_the_teeth_of_a_motor_are_counted():
+    g = torque(2, highest=5.0)
+    d = jfsm.diagnose(
+        record(with_teeth(g), g, noise=0.005),
+        rigid(),
+        causes=["ripple", "sine_stiffness", "cubic_hardening", "coulomb", "elastic_joint"],
+        key=jax.random.key(0),
+    )
+    [found] = d.findings
+    assert (found.cause, found.at) == ("ripple", (0, 1)) and found.probability > 0.9
+    for name, right, share in (("A", RIPPLE, 0.05), ("n", TEETH, 0.01)):
         assert found.parameters[name].value == pytest.approx(right, rel=share)

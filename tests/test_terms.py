@@ -67,6 +67,7 @@ LAWS = {
     "damping_drift": ((2.0, 0.3), lambda d, w, z: 2.0 * (T - 0.3) * w),
     "stiffness_drop": ((2.0, 0.7), lambda d, w, z: -2.0 * d),
     "parametric_stiffness": ((2.0, 3.0, 0.2), lambda d, w, z: 2.0 * np.cos(3 * T + 0.2) * d),
+    "ripple": ((2.0, 12.0, 0.4), lambda d, w, z: 2.0 * np.sin(12.0 * d + 0.4)),
     "preload": ((2.0,), lambda d, w, z: -2.0),
     "periodic_disturbance": ((2.0, 3.0, 0.2), lambda d, w, z: -2.0 * np.cos(3 * T + 0.2)),
 }

@@ -69,6 +69,7 @@ from .terms import Preload as Preload
 from .terms import QuadraticDamping as QuadraticDamping
 from .terms import QuadraticStiffness as QuadraticStiffness
 from .terms import QuinticStiffness as QuinticStiffness
+from .terms import Ripple as Ripple
 from .terms import Saturation as Saturation
 from .terms import SineStiffness as SineStiffness
 from .terms import SmoothCoulomb as SmoothCoulomb

@@ -54,6 +54,9 @@ from ...structures.law_classes import (
     PLAY as PLAY,
 )
 from ...structures.law_classes import (
+    RIPPLE as RIPPLE,
+)
+from ...structures.law_classes import (
     SENSOR as SENSOR,
 )
 from ...structures.law_classes import (
@@ -105,7 +108,7 @@ def classes_of(cause: Cause, part: AbstractTerm | AbstractSensor, peak: float, s
     if cause.effect in (LinearStiffness, LinearDamping):
         return (LINK,)
     found = {_WIDEST[cause.family], *_BY_LAW.get(cause.id, ()), *getattr(cause.effect, "classes", ())}
-    if cause.family in ("stiffness", "damping") and isinstance(part, AbstractTerm):
+    if cause.family in ("stiffness", "damping") and isinstance(part, AbstractTerm) and RIPPLE not in found:
         found.update(_by_curve(part, peak, speed))
     if isinstance(part, BoucWen) and part.beta + part.gamma > 0:  # its force ends at a largest value, as friction does
         found.update((FRICTION, DAMPING))

@@ -33,6 +33,7 @@ from .polynomial_stiffness import QuinticStiffness as QuinticStiffness
 from .polynomial_stiffness import SquareStiffness as SquareStiffness
 from .position_damping import PositionDamping as PositionDamping
 from .position_damping import VanDerPol as VanDerPol
+from .ripple import Ripple as Ripple
 from .smooth_friction import SmoothCoulomb as SmoothCoulomb
 from .time_dependent import DampingDrift as DampingDrift
 from .time_dependent import ParametricStiffness as ParametricStiffness
@@ -44,7 +45,7 @@ SMOOTH_TERMS = (
     CubicStiffness, QuadraticStiffness, QuadraticDamping, QuinticStiffness, SquareStiffness, DoubleWell, SineStiffness,
     CosineStiffness, BilinearStiffness, DeadZone, EndStop, Saturation, DampedStop, CubicDamping, PowerDamping,
     BilinearDamping, VanDerPol, PositionDamping, SmoothCoulomb, StiffnessDrift, DampingDrift, StiffnessDrop,
-    ParametricStiffness, Preload, PeriodicDisturbance,
+    ParametricStiffness, Preload, PeriodicDisturbance, Ripple,
 )  # fmt: skip
 """Laws of the present motion and of time."""
 
