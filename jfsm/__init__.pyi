@@ -49,6 +49,7 @@ from .structures import BoucWen as BoucWen
 from .structures import Cause as Cause
 from .structures import ChannelDelay as ChannelDelay
 from .structures import Clipping as Clipping
+from .structures import CommandDelay as CommandDelay
 from .structures import CosineStiffness as CosineStiffness
 from .structures import Coulomb as Coulomb
 from .structures import CoulombAsymmetric as CoulombAsymmetric

@@ -315,7 +315,7 @@ def numbers_of(
         "damping": matrices[LinearDamping],
         "stiffness": matrices[LinearStiffness],
         **sensed,
-        "force_delay": sensed["force_delay"] if ForceDelay in kinds else np.zeros(0),
+        "force_delay": sensed["force_delay"] if any(issubclass(kind, ForceDelay) for kind in kinds) else np.zeros(0),
         "channel_delay": np.array(list(channel_delay.values()), dtype=float),
         "late_channel": np.array(list(channel_delay), dtype=int),
         "own_numbers": structure.own_numbers if is_traced(structure.own_numbers) else np.asarray(structure.own_numbers),

@@ -22,6 +22,7 @@ from ._sensors import AccelerationBias as AccelerationBias
 from ._sensors import AccelerationGain as AccelerationGain
 from ._sensors import ChannelDelay as ChannelDelay
 from ._sensors import Clipping as Clipping
+from ._sensors import CommandDelay as CommandDelay
 from ._sensors import ForceDelay as ForceDelay
 from ._sensors import ForceGain as ForceGain
 from ._sensors import Offset as Offset

@@ -12,6 +12,7 @@ from ._sensors import (
     AccelerationGain,
     ChannelDelay,
     Clipping,
+    CommandDelay,
     ForceDelay,
     ForceGain,
 )
@@ -238,6 +239,8 @@ _CAUSES = (
           "it reads too much or too little by a fixed share"),
     Cause("force_delay", "sensor", "a delay of the force", ForceDelay, 0,
           "it is late or early by a fixed time"),
+    Cause("command_delay", "drive", "a late command", CommandDelay, 0,
+          "what the drive is told takes effect later, or earlier, by a fixed time"),
     Cause("accel_bias", "sensor", "a bias of the accelerometer", AccelerationBias, 0,
           "it reads too much or too little by a fixed amount"),
     Cause("accel_gain", "sensor", "a gain error of the accelerometer", AccelerationGain, 0,

@@ -27,6 +27,9 @@ from ...structures.law_classes import (
     DELAY as DELAY,
 )
 from ...structures.law_classes import (
+    DRIVE as DRIVE,
+)
+from ...structures.law_classes import (
     FASTER as FASTER,
 )
 from ...structures.law_classes import (
@@ -77,7 +80,15 @@ from .curves import bent, growth
 _POINTS = 41
 """Points along displacement and velocity at which a law is looked at."""
 
-_WIDEST = {"stiffness": SPRING, "damping": DAMPING, "memory": MEMORY, "time": CHANGE, "input": LOAD, "sensor": SENSOR}
+_WIDEST = {
+    "stiffness": SPRING,
+    "damping": DAMPING,
+    "memory": MEMORY,
+    "time": CHANGE,
+    "input": LOAD,
+    "drive": DRIVE,
+    "sensor": SENSOR,
+}
 """The class of all laws of a family."""
 _BY_LAW = {
     "dead_zone": (PLAY,),
