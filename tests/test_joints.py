@@ -13,7 +13,7 @@ from jfsm.diagnosis.hypotheses.candidates import asked_for
 ROTOR, LINK, GEAR, LOSS = 0.02, 0.03, 40.0, 0.03
 """Inertias [kg m²], stiffness [N m/rad] and damping [N m s/rad] of a joint;"""
 WEIGHT, DRAG = 0.6, 0.08
-"""spring [N m/rad] and damping [N m s/rad] on the motor's side."""
+"""spring [N m/rad] and damping [N m s/rad] on the motor's side, or on the link's."""
 UNITS = {"displacement": "rad", "force": "N m"}
 TIME = np.arange(1200) / 200.0
 
@@ -24,10 +24,13 @@ def torque(seed: int, highest: float = 14.0) -> np.ndarray:
     return 0.2 * np.cos(np.outer(TIME, lines) + phases).sum(1)
 
 
-def of_two_inertias(g: np.ndarray) -> np.ndarray:
-    """Angle of a motor that drives a link through a spring: exact, the torque straight between samples."""
-    stiffness = np.array([[GEAR + WEIGHT, -GEAR], [-GEAR, GEAR]])
-    damping = np.array([[LOSS + DRAG, -LOSS], [-LOSS, LOSS]])
+def of_two_inertias(g: np.ndarray, side: int = 0) -> np.ndarray:
+    """Angle of a motor that drives a link through a spring: exact, the torque straight between samples.
+
+    Spring and damping are on the `side` of the motor, 0, or of the link, 1.
+    """
+    own, gear = np.diag(np.arange(2) == side), np.array([[1, -1], [-1, 1]])
+    stiffness, damping = GEAR * gear + WEIGHT * own, LOSS * gear + DRAG * own
     minv, dt = np.diag([1 / ROTOR, 1 / LINK]), TIME[1]
     rate = np.zeros((6, 6))  # the state, the torque and its slope
     rate[:2, 2:4], rate[2:4, :2], rate[2:4, 2:4] = np.eye(2), -minv @ stiffness, -minv @ damping
@@ -58,17 +61,17 @@ def functions(q, v, force, t, p):
 
 
 @pytest.mark.parametrize(
-    "model",
+    ("model", "side"),
     [
-        rigid(),
-        jfsm.Simulation(function, 1, {"inertia": ROTOR + LINK}),
-        jfsm.Simulation.from_accelerations(functions, 1, {"inertia": ROTOR + LINK}),
+        (rigid(), 0),
+        (jfsm.Simulation(function, 1, {"inertia": ROTOR + LINK}), 1),
+        (jfsm.Simulation.from_accelerations(functions, 1, {"inertia": ROTOR + LINK}), 1),
     ],
     ids=["structure", "function", "accelerations"],
 )
-def test_a_mass_behind_a_spring_leaves_the_plant(model):
+def test_a_mass_behind_a_spring_leaves_the_plant_with_what_a_function_knows_of_it(model, side):
     g = torque(0)
-    exact = of_two_inertias(g)
+    exact = of_two_inertias(g, side)
     elastic = jfsm.causes()["elastic_joint"].apply(model, at=(0, 1), k=GEAR, c=LOSS, m=LINK)
     run = jfsm.simulate(elastic, record(exact, g), reconstruction="linear").displacement
     np.testing.assert_allclose(np.asarray(run)[:, 0], exact, atol=1e-5 * np.max(np.abs(exact)))

@@ -46,7 +46,50 @@ def hidden_rate(plant: Plant, x: State, v: State, z: Hidden, t: Scalar, base: Sc
         rates = law.state_rate(d, w, mine[: law.states], t)
         return _padded(rates - jnp.asarray(law.base) * base if law.base else rates, mine)
 
-    return _each(plant, x, v, z, rate)
+    found = _each(plant, x, v, z, rate)
+    if not has_parts_behind(plant):
+        return found
+    # What a function knows of the mass behind a spring, its weight say, acts on that mass.
+    pulled = jnp.sum(plant.memory.direction * function_force(plant, x, v, z, t)[None, :], 1)
+    slow = [_of_parts_behind(plant, i, lambda law: 1.0 / getattr(law, law.takes)) * pulled[i] for i in _slots(plant)]
+    width = hidden_width(plant.memory)
+    return found - jnp.concatenate([jnp.zeros(width).at[1].set(each) for each in slow])
+
+
+def has_parts_behind(plant: Plant) -> bool:
+    """Whether a plant of its own motion has laws that may take inertia of the place where they act."""
+    own = plant.own is not None or plant.local is not None
+    return own and len(plant.memory) > 0 and any(law.takes for law in plant.memory.laws)
+
+
+def function_force(plant: Plant, x: State, v: State, z: Hidden, t: Scalar) -> State:
+    """Force that all but the inertia of a plant of its own motion needs where the parts behind springs are."""
+    for i in _slots(plant):
+        (d, w), mine, row = plant.memory.motion(i, x, v), _own(plant, z, i), plant.memory.direction[i]
+        there = _of_parts_behind(plant, i, lambda _: 1.0)
+        x, v = x + row * there * (mine[0] - d), v + row * there * (mine[1] - w)
+    if plant.local is not None:
+        return plant.local.force_at(x, v, t)
+    assert plant.own is not None
+    free = plant.own(plant.own_numbers, x, v, jnp.zeros_like(x), t)
+    return -jnp.linalg.solve(plant.own.answer(plant.own_numbers, x, v, t), free)
+
+
+def force_in_front(plant: Plant, force: State) -> State:
+    """Of the force that a function needs, what acts on the masses in front of springs."""
+    for i in _slots(plant):
+        row = plant.memory.direction[i]
+        force = force - row * jnp.sum(row * force) * _of_parts_behind(plant, i, lambda _: 1.0)
+    return force
+
+
+def _of_parts_behind(plant: Plant, slot: int, ask) -> Scalar:
+    """A number of a law that takes inertia; 0 of another one."""
+    return plant.memory.choose(slot, lambda law: jnp.asarray(ask(law) if law.takes else 0.0))
+
+
+def _slots(plant: Plant) -> range:
+    return range(len(plant.memory))
 
 
 def carried(plant: Plant) -> Float[Array, "hidden dof"]:

@@ -15,7 +15,20 @@ from jaxtyping import Bool, Float
 
 from .._traced import kept_result
 from .._types import Array
-from ._forces import Hidden, Modes, Scalar, Square, State, friction_limits, hidden_rate, settle, smooth_force
+from ._forces import (
+    Hidden,
+    Modes,
+    Scalar,
+    Square,
+    State,
+    force_in_front,
+    friction_limits,
+    function_force,
+    has_parts_behind,
+    hidden_rate,
+    settle,
+    smooth_force,
+)
 from ._plant import Plant
 
 _SEGMENTS = 3
@@ -65,35 +78,21 @@ def inverse_mass_at(plant: Plant, minv: Square, x: State, v: State, t: Scalar) -
         return _solved(plant.local.mass_at(t) - plant.behind, jnp.eye(plant.dof))
     if plant.own is None:
         return minv
-    if not _has_parts_behind(plant):
-        return plant.own.answer(plant.own_numbers, x, v, t)
-    return _solved(_mass_that_stays(plant, x, v, t)[1], jnp.eye(plant.dof))
-
-
-def _has_parts_behind(plant: Plant) -> bool:
-    """Whether any of its laws may take inertia of the place where it acts."""
-    return len(plant.memory) > 0 and any(law.takes for law in plant.memory.laws)
-
-
-def _mass_that_stays(plant: Plant, x: State, v: State, t: Scalar) -> tuple[Square, Square]:
-    """Mass matrix in a state of a plant with its own motion, and that of what does not move behind springs."""
-    assert plant.own is not None
-    mass = _solved(plant.own.answer(plant.own_numbers, x, v, t), jnp.eye(plant.dof))
-    return mass, mass - plant.behind
+    answer = plant.own.answer(plant.own_numbers, x, v, t)
+    if not has_parts_behind(plant):
+        return answer
+    return _solved(_solved(answer, jnp.eye(plant.dof)) - plant.behind, jnp.eye(plant.dof))
 
 
 def free_acceleration(plant: Plant, minv: Square, x: State, v: State, z: Hidden, g: State, t: Scalar) -> State:
     """Acceleration without friction."""
     net = g - smooth_force(plant, x, v, z, t)
+    if has_parts_behind(plant):
+        there = inverse_mass_at(plant, minv, x, v, t)
+        return times(there, net - force_in_front(plant, function_force(plant, x, v, z, t)))
     if plant.local is not None:
-        return _solved(plant.local.mass_at(t) - plant.behind, net - plant.local.force_at(x, v, t))
-    if plant.own is None:
-        return times(minv, net)
-    whole = plant.own(plant.own_numbers, x, v, net, t)
-    if not _has_parts_behind(plant):
-        return whole
-    mass, stays = _mass_that_stays(plant, x, v, t)
-    return _solved(stays, times(mass, whole))
+        return _solved(plant.local.mass_at(t), net - plant.local.force_at(x, v, t))
+    return times(minv, net) if plant.own is None else plant.own(plant.own_numbers, x, v, net, t)
 
 
 def linearised(

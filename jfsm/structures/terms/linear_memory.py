@@ -80,9 +80,9 @@ class ElasticJoint(AbstractTerm):
     """A spring k with a dashpot c behind which the part m of a mass moves that was taken as one; the rest stays.
 
     The coordinate is that of the part where forces act, of a gear the motor's side: m is then the inertia of the link,
-    and the motor keeps the remainder, so that slow motions are those of the whole. Weight and all else that acts on the
-    coordinate stays on its side: k is larger by the stiffness that the weight of the part behind it has. The part moves
-    as the place does at the start.
+    and the motor keeps the remainder, so that slow motions are those of the whole. Terms that act on the coordinate
+    stay on its side; what the function of a simulation knows, weight say, acts on the part behind. The part moves as
+    the place does at the start.
 
     Hidden states: displacement and velocity of the part relative to the link's near end, which must not accelerate:
     ground, or the moving base.
