@@ -50,10 +50,11 @@ def hidden_rate(plant: Plant, x: State, v: State, z: Hidden, t: Scalar, base: Sc
     if not has_parts_behind(plant):
         return found
     # What a function knows of the mass behind a spring, its weight say, acts on that mass.
+    is_behind, mass = parts_behind(plant)
     pulled = jnp.sum(plant.memory.direction * function_force(plant, x, v, z, t)[None, :], 1)
-    slow = [_of_parts_behind(plant, i, lambda law: 1.0 / getattr(law, law.takes)) * pulled[i] for i in _slots(plant)]
+    slower = jnp.where(is_behind > 0, pulled / jnp.where(is_behind > 0, mass, 1.0), 0.0)
     width = hidden_width(plant.memory)
-    return found - jnp.concatenate([jnp.zeros(width).at[1].set(each) for each in slow])
+    return found - (slower[:, None] * (jnp.arange(width) == 1)[None, :]).reshape(-1)
 
 
 def has_parts_behind(plant: Plant) -> bool:
@@ -62,12 +63,22 @@ def has_parts_behind(plant: Plant) -> bool:
     return own and len(plant.memory) > 0 and any(law.takes for law in plant.memory.laws)
 
 
+def parts_behind(plant: Plant) -> tuple[Modes, Modes]:
+    """Whether the law of each memory slot takes inertia, 1 or 0, and how much."""
+    slots = plant.memory
+    which = np.zeros((len(slots.laws), slots.parameters.shape[1]))
+    for row, law in zip(which, slots.laws, strict=True):
+        row[[p.name for p in law.parameters].index(law.takes) if law.takes else []] = 1.0
+    mine = jnp.asarray(which)[slots.kind]
+    return jnp.sum(mine, 1), jnp.sum(mine * slots.parameters, 1)
+
+
 def function_force(plant: Plant, x: State, v: State, z: Hidden, t: Scalar) -> State:
     """Force that all but the inertia of a plant of its own motion needs where the parts behind springs are."""
-    for i in _slots(plant):
-        (d, w), mine, row = plant.memory.motion(i, x, v), _own(plant, z, i), plant.memory.direction[i]
-        there = _of_parts_behind(plant, i, lambda _: 1.0)
-        x, v = x + row * there * (mine[0] - d), v + row * there * (mine[1] - w)
+    slots, (is_behind, _) = plant.memory, parts_behind(plant)
+    for i in range(len(slots)):
+        (d, w), mine, row = slots.motion(i, x, v), _own(plant, z, i), slots.direction[i] * is_behind[i]
+        x, v = x + row * (mine[0] - d), v + row * (mine[1] - w)
     if plant.local is not None:
         return plant.local.force_at(x, v, t)
     assert plant.own is not None
@@ -77,19 +88,8 @@ def function_force(plant: Plant, x: State, v: State, z: Hidden, t: Scalar) -> St
 
 def force_in_front(plant: Plant, force: State) -> State:
     """Of the force that a function needs, what acts on the masses in front of springs."""
-    for i in _slots(plant):
-        row = plant.memory.direction[i]
-        force = force - row * jnp.sum(row * force) * _of_parts_behind(plant, i, lambda _: 1.0)
-    return force
-
-
-def _of_parts_behind(plant: Plant, slot: int, ask) -> Scalar:
-    """A number of a law that takes inertia; 0 of another one."""
-    return plant.memory.choose(slot, lambda law: jnp.asarray(ask(law) if law.takes else 0.0))
-
-
-def _slots(plant: Plant) -> range:
-    return range(len(plant.memory))
+    rows = plant.memory.direction * parts_behind(plant)[0][:, None]
+    return force - jnp.sum(rows * jnp.sum(rows * force[None, :], 1)[:, None], 0)
 
 
 def carried(plant: Plant) -> Float[Array, "hidden dof"]:

@@ -155,8 +155,9 @@ class Plant(eqx.Module):
     `force_gain`, `force_offset` and `channel_offset` are empty where every lane has its own elsewhere, `force_delay`
     and `channel_delay` without delayed sensors: delays have programs of their own. The plant of a simulation moves by
     its `own` function of `own_numbers`, `mass` is the mass matrix at rest, and `behind` what of it moves behind
-    springs, of which the function knows nothing (empty in other plants); the terms act beside. Within a sample of
-    a measured motion it moves as `local` says, in place of the function.
+    springs, of which the function knows nothing (empty without memories and in other plants: XLA cannot compile kernels
+    with arrays that take no part); the terms act beside. Within a sample of a measured motion it moves as `local` says,
+    in place of the function.
     `late_channel` holds the channel of each channel delay. Delayed forces reach back at most `reach` samples. With
     `rolled` stages of a step the program is a third smaller, as fast for one motion and its derivatives, and half as
     fast for many motions. Plants side by side have a leading axis of lanes on every array but those of whole numbers.
@@ -187,6 +188,11 @@ class Plant(eqx.Module):
     @property
     def dof(self) -> int:
         return self.mass.shape[0]
+
+    @property
+    def whole_mass(self) -> Float[Array, "*lanes dof dof"]:
+        """The mass matrix with what moves behind springs, as a function of its own knows it."""
+        return self.mass + self.behind if self.behind.size else self.mass
 
     @property
     def elementary(self) -> bool:
@@ -311,7 +317,7 @@ def numbers_of(
     kinds = {type(sensor) for sensor in structure.sensors}
     arrays: dict[str, Any] = {
         "mass": mass - behind,
-        "behind": behind if structure.own is not None else np.zeros((0, 0)),
+        "behind": behind if structure.own is not None and laws.memory else np.zeros((0, 0)),
         "damping": matrices[LinearDamping],
         "stiffness": matrices[LinearStiffness],
         **sensed,

@@ -75,7 +75,8 @@ def times(matrix: Float[Array, "rows columns"], vector: Float[Array, " columns"]
 def inverse_mass_at(plant: Plant, minv: Square, x: State, v: State, t: Scalar) -> Square:
     """Inverse of the mass matrix in a state: that of a plant with its own motion is another one in every state."""
     if plant.local is not None:
-        return _solved(plant.local.mass_at(t) - plant.behind, jnp.eye(plant.dof))
+        mass = plant.local.mass_at(t)
+        return _solved(mass - plant.behind if plant.behind.size else mass, jnp.eye(plant.dof))
     if plant.own is None:
         return minv
     answer = plant.own.answer(plant.own_numbers, x, v, t)

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self, cast
 
 import equinox as eqx
 import jax
@@ -190,7 +190,7 @@ class Structure(eqx.Module):
             self.commands,
         )
 
-    def commanded(self, at: int, stiffness: float, damping: float = 0.0) -> "Structure":
+    def commanded(self, at: int, stiffness: float, damping: float = 0.0) -> Self:
         """The structure, degree of freedom `at` of which a position loop holds where it is told to be.
 
         The loop pulls it to the commanded position as a spring does, and brakes it as a dashpot does. The force of a
@@ -211,7 +211,7 @@ class Structure(eqx.Module):
         """
         loop = (LinearStiffness(stiffness, at=(0, at)), LinearDamping(damping, at=(0, at)))
         held = self.having(terms=(*self.terms, *(term for term in loop if float(term.values[0]))))
-        return held._told(_commands((*self.commands, at), self.dof))
+        return cast(Self, held._told(_commands((*self.commands, at), self.dof)))
 
     def _told(self, commands: tuple[int, ...]) -> "Structure":
         """The same plant, in which the forces of these degrees of freedom are commands."""
