@@ -49,6 +49,7 @@ from .structures import BoucWen as BoucWen
 from .structures import Cause as Cause
 from .structures import ChannelDelay as ChannelDelay
 from .structures import Clipping as Clipping
+from .structures import CommandDelay as CommandDelay
 from .structures import CosineStiffness as CosineStiffness
 from .structures import Coulomb as Coulomb
 from .structures import CoulombAsymmetric as CoulombAsymmetric
@@ -59,6 +60,7 @@ from .structures import DampingDrift as DampingDrift
 from .structures import DeadZone as DeadZone
 from .structures import DelayedForce as DelayedForce
 from .structures import DoubleWell as DoubleWell
+from .structures import ElasticJoint as ElasticJoint
 from .structures import EndStop as EndStop
 from .structures import ForceDelay as ForceDelay
 from .structures import ForceGain as ForceGain
@@ -79,6 +81,7 @@ from .structures import Preload as Preload
 from .structures import QuadraticDamping as QuadraticDamping
 from .structures import QuadraticStiffness as QuadraticStiffness
 from .structures import QuinticStiffness as QuinticStiffness
+from .structures import Ripple as Ripple
 from .structures import Saturation as Saturation
 from .structures import Scale as Scale
 from .structures import Simulation as Simulation

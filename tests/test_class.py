@@ -71,6 +71,7 @@ LAWS = {
     ("a spring that yields", "a force with memory"): [("bouc_wen", {"k": 1.0, "beta": 1.0, "gamma": -1.5, "n": 1.0})],
     ("a force with memory",): [("maxwell", {"k": 1.0, "tau": 0.2})],
     ("a stiffness that changes with time", "a change with time"): [("stiffness_drop", {"dk": 1.0, "t_star": 0.2})],
+    ("a force that repeats with position", "a nonlinear spring"): [("ripple", {"A": 1.0, "n": 40.0, "phase": 0.3})],
     ("an unmeasured load",): [("preload", {"F": 1.0})],
 }
 

@@ -11,6 +11,7 @@ import pytest
 import jfsm
 from jfsm.diagnosis.evidence.setup import Problem
 from jfsm.identification import prepare
+from jfsm.plant import Size, substeps_for
 from tests.test_simulation import (
     DOUBLE,
     GRAVITY,
@@ -160,3 +161,11 @@ def test_friction_is_named_in_the_joint_where_it_is():
     [found] = d.findings
     assert (found.cause, found.at) == ("coulomb", (1, 2)) and found.probability > 0.9
     assert found.parameters["F"].value == pytest.approx(0.15, rel=0.1)
+
+
+def test_it_needs_the_steps_of_the_traced_function_beside_a_map():
+    states = np.random.default_rng(0).standard_normal((300, 2)) * [0.5, 4.0]
+    force_map = jfsm.RKPM.fit(states, states[:, 0] ** 3 + states[:, 1], order=2, neighbours=40)
+    beside = [model + force_map.on(at=(0, 1)) for model in (DOUBLE, ASKED)]
+    traced, asked = (substeps_for(model, 4 * STEP, Size(0.5, 4.0)) for model in beside)
+    assert asked == traced > 1

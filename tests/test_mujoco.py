@@ -172,3 +172,49 @@ def test_an_armature_that_the_model_does_not_state_is_found_and_written():
     assert d.refitted["armature_shoulder"].value == pytest.approx(0.02, rel=0.05)
     changes = jfsm.adapters.mujoco.written(arm(), d.extended).changes
     assert 'name="shoulder" armature="0.0' in changes and 'name="elbow" armature' not in changes
+
+
+KP, KV, GEAR = 40.0, 2.0, 1.5
+HELD = arm('damping="0.03"').replace(
+    "</worldbody>",
+    f'</worldbody><actuator><position joint="elbow" kp="{KP}" kv="{KV}" gear="{GEAR}"/>'
+    f'<position joint="shoulder" kp="{2 * KP}" kv="{KV}"/></actuator>',
+)
+
+
+def test_commands_of_position_actuators_drive():
+    model = mujoco.MjModel.from_xml_string(HELD)
+    data, each = mujoco.MjData(model), round(STEP / FINE)
+    time = STEP * np.arange(120)
+    wanted = 0.2 * np.stack([np.sin(5 * time), np.sin(7 * time)], 1)
+    between = 0.2 * np.stack([np.sin(w * (np.arange(120 * each) + 0.5) * FINE) for w in (5, 7)], 1)
+    angles = np.empty((120, 2))
+    for i in range(120):
+        angles[i] = data.qpos
+        for shoulder, elbow in between[i * each : (i + 1) * each]:
+            data.ctrl[:] = elbow, shoulder  # in the order of the actuators
+            mujoco.mj_step(model, data)
+    force = jfsm.adapters.mujoco.forces_of_commands(HELD, wanted)
+    np.testing.assert_allclose(force, wanted * [2 * KP, KP * GEAR])
+    held = jfsm.adapters.mujoco.simulation(HELD, commanded=True)
+    assert held.commands == (1, 2) and held.values()["stiffness@0-2.k"] == pytest.approx(KP * GEAR**2)
+    run = jfsm.simulate(held, jfsm.Record(time, force=force, displacement=angles, at_rest=True))
+    np.testing.assert_allclose(run.displacement, angles, atol=2e-3)
+
+
+def test_a_loop_that_was_found_goes_into_its_actuator():
+    held = jfsm.adapters.mujoco.simulation(HELD, commanded=True)
+    same = jfsm.adapters.mujoco.written(HELD, held)
+    assert same.changes == "" and same.left == ()
+    changed = held.with_values({"damping@0-2.c#2": 1.4 * GEAR**2, "damping@0-2.c": 0.04})
+    found = jfsm.adapters.mujoco.written(HELD, changed)
+    again = jfsm.adapters.mujoco.simulation(found.xml, commanded=True).values()
+    assert again["damping@0-2.c#2"] == pytest.approx(1.4 * GEAR**2) and again["damping@0-2.c"] == pytest.approx(0.04)
+    assert again["stiffness@0-2.k"] == pytest.approx(KP * GEAR**2)
+
+
+def test_what_cannot_be_commanded_is_refused():
+    with pytest.raises(ValueError, match="must have one position actuator in each joint that is commanded; shoulder"):
+        jfsm.adapters.mujoco.simulation(arm(), commanded=True)
+    with pytest.raises(ValueError, match=r"`commands` must have a column for each of 2 joints; got shape \(3, 1\)"):
+        jfsm.adapters.mujoco.forces_of_commands(HELD, np.zeros((3, 1)))

@@ -61,11 +61,13 @@ LAWS = {
     "free_play": ((5.0, 0.1, 0.8, 0.5), lambda d, w, z: np.clip(5.0 * dz(d - z[0], 0.1), -0.5, 0.8)),
     "maxwell": ((2.0, 0.4), lambda d, w, z: 2.0 * z[0]),
     "attached_oscillator": ((0.3, 4.0, 0.05), lambda d, w, z: 0.3 * (16 * (d - z[0]) + 2 * 0.05 * 4 * (w - z[1]))),
+    "elastic_joint": ((40.0, 0.2, 0.3), lambda d, w, z: 40 * (d - z[0]) + 0.2 * (w - z[1])),
     "delayed_force": ((-2.0, 0.1), lambda d, w, z: -2.0 * d),
     "stiffness_drift": ((2.0, 0.3), lambda d, w, z: 2.0 * (T - 0.3) * d),
     "damping_drift": ((2.0, 0.3), lambda d, w, z: 2.0 * (T - 0.3) * w),
     "stiffness_drop": ((2.0, 0.7), lambda d, w, z: -2.0 * d),
     "parametric_stiffness": ((2.0, 3.0, 0.2), lambda d, w, z: 2.0 * np.cos(3 * T + 0.2) * d),
+    "ripple": ((2.0, 12.0, 0.4), lambda d, w, z: 2.0 * np.sin(12.0 * d + 0.4)),
     "preload": ((2.0,), lambda d, w, z: -2.0),
     "periodic_disturbance": ((2.0, 3.0, 0.2), lambda d, w, z: -2.0 * np.cos(3 * T + 0.2)),
 }
@@ -79,8 +81,13 @@ RATES = {
     ],
     "maxwell": lambda d, w, z: [w - z[0] / 0.4],
     "attached_oscillator": lambda d, w, z: [z[1], 16 * (d - z[0]) + 2 * 0.05 * 4 * (w - z[1])],
+    "elastic_joint": lambda d, w, z: [z[1], (40 * (d - z[0]) + 0.2 * (w - z[1])) / 0.3],
 }
-HIDDEN = {"iwan": [slips(0.3, -0.5) * s for s in (-1.0, 0.0, 0.6)], "attached_oscillator": [(0.1, -0.3), (0.0, 0.0)]}
+HIDDEN = {
+    "iwan": [slips(0.3, -0.5) * s for s in (-1.0, 0.0, 0.6)],
+    "attached_oscillator": [(0.1, -0.3), (0.0, 0.0)],
+    "elastic_joint": [(0.1, -0.3), (0.0, 0.0)],
+}
 SCALE = Scale(force=3.0, length=0.02, peak=0.0282, omega=40.0, begin=5.0, end=15.0)
 
 
@@ -184,6 +191,11 @@ def test_what_is_settled_stays_where_it_is(law):
 def test_a_number_that_cannot_be_is_refused(law, numbers, message):
     with pytest.raises(ValueError, match=message):
         law(*numbers, at=(0, 1))
+
+
+def test_an_elastic_joint_parts_a_mass():
+    with pytest.raises(ValueError, match=r"`at` of elastic_joint must be \(0, j\), the mass that is not one; got"):
+        jfsm.ElasticJoint(40.0, 0.2, 0.3, at=(1, 2))
 
 
 def test_an_attached_oscillator_hangs_on_a_mass():

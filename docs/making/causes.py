@@ -19,6 +19,7 @@ FAMILIES = {
     "memory": ("Memory", "The force depends on what was before: it has hidden states, or answers late."),
     "time": ("Changes with time", "The law itself changes while the record runs."),
     "input": ("Loads", "A force acts that nobody measured."),
+    "drive": ("Drives", "What drives the structure does not do what it is told."),
     "sensor": ("Sensors", "The structure is as believed; a channel is not."),
 }
 """Title and one sentence of each family."""

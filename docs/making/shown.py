@@ -35,7 +35,14 @@ NUMBERS = {
     "lugre": {"F": 0.05, "F_static": 0.08, "v_s": 0.02, "sigma0": 200.0, "sigma1": 1.0},
 }
 """Numbers of examples whose natural ones hold the mass fast, let it escape, or hide their shape."""
-SENSORS = {"force_gain": 0.3, "force_delay": 0.04, "accel_bias": 0.4, "accel_gain": 0.3, "channel_delay": 0.04}
+SENSORS = {
+    "force_gain": 0.3,
+    "force_delay": 0.04,
+    "command_delay": 0.04,
+    "accel_bias": 0.4,
+    "accel_gain": 0.3,
+    "channel_delay": 0.04,
+}
 """Numbers of the sensors' faults; a clipped channel ends at half of its largest reading."""
 
 
@@ -127,6 +134,8 @@ def _read(sensor: Any, true: np.ndarray) -> np.ndarray:
             return (1 + sensor.value) * true
         case "force_delay" | "channel_delay":
             return np.interp(TIME - sensor.value, TIME, true)
+        case "command_delay":
+            return np.interp(TIME - float(sensor.tau), TIME, true)
         case "clipping":
             return np.clip(true, -sensor.value, sensor.value)
     return true + sensor.value

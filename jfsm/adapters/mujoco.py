@@ -14,7 +14,7 @@ from threading import local
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import ArrayLike, Float
 
 from ..structures import AbstractTerm, Coulomb, LinearDamping, LinearStiffness, Simulation, Structure
 
@@ -26,6 +26,15 @@ _WORTH = 1e-3
 """and the share from which it is written."""
 _ATTRIBUTES = {"coulomb": "frictionloss", "damping": "damping", "stiffness": "stiffness"}
 """What a term in a joint is called in a model, by its kind."""
+
+
+class _Loop(NamedTuple):
+    """A position actuator of a joint, by its number: force per command, and its spring and dashpot in the joint."""
+
+    actuator: int
+    gain: float
+    stiffness: float
+    damping: float
 
 
 class _Joint(NamedTuple):
@@ -56,11 +65,18 @@ class Written:
     left: tuple[str, ...]
 
 
-def simulation(model: Any, joints: Sequence[str] | None = None, trust: Mapping[str, float] | None = None) -> Simulation:
+def simulation(
+    model: Any,
+    joints: Sequence[str] | None = None,
+    trust: Mapping[str, float] | None = None,
+    *,
+    commanded: bool = False,
+) -> Simulation:
     """A model of MuJoCo, its joints as coordinates.
 
     A record holds the forces in the joints (N m, or N in slides), measured or commanded, and their positions (rad, or
-    m): channel 1 is the first joint. Actuators, contacts, limits and equality constraints take no part.
+    m): channel 1 is the first joint. Contacts, limits and equality constraints take no part; nor do actuators, unless
+    their commands drive.
 
     Parameters
     ----------
@@ -71,20 +87,25 @@ def simulation(model: Any, joints: Sequence[str] | None = None, trust: Mapping[s
         By default all.
     trust : mapping of path to float, optional
         Relative uncertainty of own values, as of a `Structure`.
+    commanded : bool
+        Whether the model's position actuators hold its joints. The forces of a record are then what
+        `forces_of_commands` makes of their commands.
 
     Returns
     -------
     Simulation
         With a Coulomb term for each joint's `frictionloss`, a dashpot for its `damping` and a spring for its
         `stiffness`; its `armature` is a number of the function, ``armature_<joint>``. One that the model does not state
-        begins at next to nothing, and may become anything.
+        begins at next to nothing, and may become anything. The loop of an actuator is one more spring and dashpot; see
+        `Structure.commanded`.
 
     Raises
     ------
     ImportError
         If MuJoCo is not installed.
     ValueError
-        If a joint is not there, is no hinge or slide, or equality constraints tie the joints.
+        If a joint is not there, is no hinge or slide, or equality constraints tie the joints; if they are commanded and
+        a joint has no position actuator, or several.
 
     Examples
     --------
@@ -105,7 +126,42 @@ def simulation(model: Any, joints: Sequence[str] | None = None, trust: Mapping[s
     least = dict(zip(stated, _UNSTATED * _inertias(asked, stated), strict=True))
     numbers = {name: value or float(least[name]) for name, value in stated.items()}
     believed = {name: _UNCERTAIN for name, value in stated.items() if not value} | dict(trust or {})
-    return Simulation.from_accelerations(asked, len(moving), numbers, _terms(compiled, moving), trust=believed)
+    found = Simulation.from_accelerations(asked, len(moving), numbers, _terms(compiled, moving), trust=believed)
+    for number, loop in enumerate(_loops(mj, compiled, moving) if commanded else (), 1):
+        found = found.commanded(number, loop.stiffness, loop.damping)
+    return found
+
+
+def forces_of_commands(
+    model: Any, commands: Float[ArrayLike, "n joints"], joints: Sequence[str] | None = None
+) -> Float[np.ndarray, "n joints"]:
+    """The forces (n, joints) of a record whose joints are held by a model's position actuators: what the actuators make
+    of their commands (n, joints) where the joints are at zero.
+
+    Parameters
+    ----------
+    model, joints
+        As of `simulation`.
+    commands : (n, joints) array
+        Positions that were commanded (rad, or m), one column for each joint.
+
+    Raises
+    ------
+    ImportError, ValueError
+        As `simulation`; or if the commands are not one column for each joint.
+
+    Examples
+    --------
+    >>> force = jfsm.adapters.mujoco.forces_of_commands("arm.xml", wanted)
+    >>> record = jfsm.Record(t, force=force, displacement=angles, units={"displacement": "rad"})
+    >>> d = jfsm.diagnose(record, jfsm.adapters.mujoco.simulation("arm.xml", commanded=True))
+    """
+    mj = _package()
+    compiled = _compiled(mj, model)
+    loops, given = _loops(mj, compiled, _joints(mj, compiled, joints)), np.asarray(commands, dtype=float)
+    if given.ndim != 2 or given.shape[1] != len(loops):
+        raise ValueError(f"`commands` must have a column for each of {len(loops)} joints; got shape {given.shape}.")
+    return given * np.array([loop.gain for loop in loops])
 
 
 def written(model: Any, found: Structure, joints: Sequence[str] | None = None) -> Written:
@@ -133,7 +189,13 @@ def written(model: Any, found: Structure, joints: Sequence[str] | None = None) -
     changed = mj.MjSpec.from_string(model if _is_text(model) else Path(model).read_text(encoding="utf-8"))
     before = changed.to_xml()
     left, values = list[str](), dict[tuple[str, str], float]()
+    loops = _loops(mj, compiled, moving) if found.commands else []
+    held = [_loop_of(found, number) for number, _ in enumerate(loops, 1)]
+    for loop, terms in zip(loops, held, strict=True):
+        _tune(changed.actuators[loop.actuator], float(compiled.actuator_gear[loop.actuator, 0]), terms)
     for term in found.terms:
+        if any(term is one for terms in held for one in terms):
+            continue
         attribute = _ATTRIBUTES.get(term.kind) if min(term.at) == 0 else None
         if attribute is None:
             left.append(f"{term.kind} at {term.place}")
@@ -245,6 +307,28 @@ def _terms(model: Any, joints: Sequence[_Joint]) -> Iterator[AbstractTerm]:
             yield LinearStiffness(float(model.jnt_stiffness[joint.index]), at=(0, number))
 
 
+def _loops(mj: Any, model: Any, joints: Sequence[_Joint]) -> list[_Loop]:
+    """The position actuators of the joints."""
+    affine, on_joint = int(mj.mjtBias.mjBIAS_AFFINE), int(mj.mjtTrn.mjTRN_JOINT)
+    loops = []
+    for joint in joints:
+        mine = [
+            i
+            for i in range(model.nu)
+            if (int(model.actuator_trntype[i]), int(model.actuator_trnid[i, 0])) == (on_joint, joint.index)
+        ]
+        if len(mine) != 1 or int(model.actuator_biastype[mine[0]]) != affine or model.actuator_biasprm[mine[0], 1] >= 0:
+            raise ValueError(
+                f"`model` must have one position actuator in each joint that is commanded; {joint.name} has "
+                f"{len(mine)} actuators, of this kind or others. Name the joints that have one in `joints`."
+            )
+        [i] = mine
+        gear = float(model.actuator_gear[i, 0])
+        spring, dashpot = (-float(model.actuator_biasprm[i, k]) * gear**2 for k in (1, 2))
+        loops.append(_Loop(i, gear * float(model.actuator_gainprm[i, 0]), spring, dashpot))
+    return loops
+
+
 def _has_spring(model: Any, joint: _Joint) -> bool:
     """Whether a joint has a spring that is at rest in its zero; another one is left to MuJoCo."""
     return model.jnt_stiffness[joint.index] > 0 and model.qpos_spring[joint.position] == 0
@@ -275,6 +359,21 @@ def _inertias(asked: _Accelerations, numbers: Mapping[str, float]) -> Float[np.n
     pushes, rest = np.concatenate([np.zeros((1, dof)), np.eye(dof)]), np.zeros((dof + 1, dof))
     a = asked(rest, rest, pushes, np.zeros(dof + 1), numbers)
     return 1.0 / np.diag(a[1:] - a[0])
+
+
+def _loop_of(found: Structure, number: int) -> list[AbstractTerm]:
+    """Spring and dashpot of the loop that holds a joint: the last of their kind that the simulation had there."""
+    mine = [term for term in found.terms if term.at == (0, number)]
+    kinds = [[term for term in mine if isinstance(term, kind)] for kind in (LinearStiffness, LinearDamping)]
+    return [terms[-1] for terms in kinds if terms]
+
+
+def _tune(actuator: Any, gear: float, terms: Sequence[AbstractTerm]) -> None:
+    """Give an actuator the spring and the dashpot that its loop was found to have."""
+    bias = np.array(actuator.biasprm)
+    for term in terms:
+        bias[1 if isinstance(term, LinearStiffness) else 2] = -float(term.values[0]) / gear**2
+    actuator.biasprm = bias
 
 
 def _set(joint: Any, attribute: str, value: float) -> None:

@@ -22,7 +22,7 @@ from .evidence.missing_force import Residual, residual
 from .evidence.setup import Problem
 from .evidence.split import HeldOut, split
 from .hypotheses.candidate import Candidate
-from .hypotheses.candidates import chosen_causes
+from .hypotheses.candidates import asked_for, chosen_causes
 from .look.in_verdict import mended_model
 from .look.looked import held_out_alike, looked_at
 from .report.assemble import Reached, Tested, assemble
@@ -56,7 +56,7 @@ def conduct(
     looked = looked_at(given, model)
     record, holdout = looked.records, held_out_alike(holdout, looked)
     training, _ = split(record, holdout)
-    chosen = chosen_causes(causes)
+    chosen = chosen_causes(asked_for(causes, model, record))
     whole = [whole for whole, _ in training]
     clipped = limited(whole, model) if "clipping" in chosen else []
     stated = model

@@ -190,6 +190,8 @@ def latent_force(
     a = (true[:, 0] - r - x @ np.asarray(linear.stiffness).T - v @ np.asarray(linear.damping).T) @ minv.T
     if plant.own is not None:
         needed, mass, _ = own_force(plant.own, np.asarray(plant.own_numbers), x, v, a, np.asarray(inputs.time[:padded]))
+        behind = np.asarray(plant.whole_mass - plant.mass)
+        needed, mass = needed - a @ behind.T, mass - behind
         r, known = true[:, 0] - needed, known + x @ np.asarray(plant.stiffness).T + v @ np.asarray(plant.damping).T
         force_std = np.sqrt(np.einsum("nij,nj->ni", (mass @ minv) ** 2, std[:, 2 * dof :] ** 2))
         std = np.concatenate([std[:, : 2 * dof], force_std], 1)

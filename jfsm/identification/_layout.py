@@ -29,6 +29,7 @@ _PARTS = (
     "channel_offset",
     "channel_delay",
     "own_numbers",
+    "behind",
 )
 _SLOTS = ("smooth", "friction", "memory", "delayed")
 

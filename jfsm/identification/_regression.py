@@ -42,10 +42,11 @@ _ONE = 1e-13
 
 
 class Motion(NamedTuple):
-    """Displacement and velocity (n, dof) at these times (n,), as many as others have too."""
+    """Displacement, velocity and acceleration (n, dof) at these times (n,), as many as others have too."""
 
     x: Float[np.ndarray, "n dof"]
     v: Float[np.ndarray, "n dof"]
+    a: Float[np.ndarray, "n dof"]
     time: Float[np.ndarray, " n"]
 
 
@@ -245,8 +246,8 @@ def still_afterwards(latent: Latent, time: np.ndarray) -> Motion:
     more = bucket(len(time)) - len(time)
     later = time[-1] + (time[-1] - time[-2]) * np.arange(1, more + 1)
     x = np.pad(latent.displacement, ((0, more), (0, 0)), "edge")
-    v = np.pad(latent.velocity, ((0, more), (0, 0)))
-    return Motion(x, v, np.concatenate([time, later]))
+    v, a = (np.pad(q, ((0, more), (0, 0))) for q in (latent.velocity, latent.acceleration))
+    return Motion(x, v, a, np.concatenate([time, later]))
 
 
 def forces_that_stay(
@@ -279,11 +280,13 @@ def _lots(kind: type[AbstractTerm], rows: list[dict[str, float]]):
 
 
 def forces_along(law: AbstractTerm, numbers: np.ndarray, motion: Motion, finer: int = 1) -> np.ndarray:
-    """Forces (rows, n) of a law along its link for rows of its numbers."""
-    row = direction(law.at, motion.x.shape[1])
-    return forces_of_law(
-        type(law), numbers, motion.x @ row, motion.v @ row, motion.time, substeps=finer * HIDDEN_SUBSTEPS
-    )
+    """Forces (rows, n) of a law along its link for rows of its numbers, less those on the inertia that it takes."""
+    row, kind = direction(law.at, motion.x.shape[1]), type(law)
+    forces = forces_of_law(kind, numbers, motion.x @ row, motion.v @ row, motion.time, substeps=finer * HIDDEN_SUBSTEPS)
+    if not kind.takes:
+        return forces
+    taken = numbers[:, [p.name for p in kind.parameters].index(kind.takes)]
+    return forces - taken[:, None] * (motion.a @ row)
 
 
 def _basis(

@@ -12,6 +12,7 @@ from ._by_itself import run_by_itself as run_by_itself
 from ._course import Course as Course
 from ._drive import Reconstruction as Reconstruction
 from ._drive import check_reconstruction as check_reconstruction
+from ._excitation import Size as Size
 from ._excitation import Swing as Swing
 from ._excitation import bucket as bucket
 from ._excitation import excitation as excitation

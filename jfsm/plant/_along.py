@@ -1,5 +1,7 @@
 """The force that laws exert along a given motion."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Float
@@ -24,9 +26,12 @@ def force_along(
     *,
     substeps: int = HIDDEN_SUBSTEPS,
 ) -> Float[Array, "n dof"]:
-    """Force [N] of everything but the linear springs and dashpots along a motion; friction slides."""
+    """Force [N] of everything but the linear springs and dashpots along a motion; friction slides.
+
+    A function of the plant's own has no part in it, also where it acts on masses behind springs.
+    """
     step = time[1] - time[0]
-    z = _hidden_along(plant, x, v, time, step, substeps)
+    z = _hidden_along(replace(plant, own=None, local=None), x, v, time, step, substeps)
 
     def one(x, v, z, t):
         linear = jnp.sum(plant.stiffness * x[None, :], 1) + jnp.sum(plant.damping * v[None, :], 1)

@@ -18,7 +18,7 @@ from ..structures import EvaluatedMotion
 from ._grid import InterpolatedInput, begin, run_on, undelayed
 from ._plant import Plant
 from ._stepper import inverse_mass
-from ._tabulated import near, tabulated
+from ._tabulated import about_a_state, tabulated
 
 _STRETCH = 16
 """Samples of a stretch."""
@@ -43,9 +43,9 @@ def run_by_itself(
     assert isinstance(plant.own, EvaluatedMotion)
     own = plant.own.with_numbers(np.asarray(plant.own_numbers))
     inputs = jax.tree.map(np.asarray, undelayed(plant, inputs))
+    state, first = _begin(plant, inputs, x0, v0), 0
     plant, dof = replace(plant, own=None, own_numbers=jnp.zeros(0)), plant.dof
     found = np.full((3, n, dof), np.nan)
-    state, first = _begin(plant, own, inputs, x0, v0), 0
     while first < n:
         here = _stretch(inputs, first)
         motion, states, settled = _settled(plant, own, here, state)
@@ -57,13 +57,9 @@ def run_by_itself(
     return found[0], found[1], found[2]
 
 
-def _begin(plant: Plant, own: EvaluatedMotion, inputs: InterpolatedInput, x0, v0) -> Any:
+def _begin(plant: Plant, inputs: InterpolatedInput, x0, v0) -> Any:
     """State at the first sample: motion and delay buffer."""
-    x, v = (np.repeat(np.asarray(q, float)[None], 2, 0) for q in (x0, v0))
-    step = float(inputs.step)
-    table = tabulated(own, _NO_NUMBERS, x, v, np.zeros_like(x), float(inputs.time[0]) + np.array([0.0, step]), nodes=2)
-    row = jax.tree.map(lambda rows: jnp.asarray(rows[0]), table)
-    here = near(plant, row, jnp.asarray(inputs.time[0]), jnp.asarray(step))
+    here = about_a_state(plant, x0, v0, float(inputs.time[0]), float(inputs.step))
     return begin(here, inverse_mass(plant), jnp.asarray(x0), jnp.asarray(v0), inputs)
 
 

@@ -11,13 +11,14 @@ from jaxtyping import Float
 from .._traced import jit_kept
 from .._types import Array, is_traced
 from ..records import Record, declipped, silent_forces
-from ..structures import Clipping, LinearDamping, LinearStiffness, Structure
+from ..structures import Clipping, EvaluatedMotion, LinearDamping, LinearStiffness, Structure
 from ._drive import Reconstruction, reconstruct
 from ._forces import State, hidden_start
 from ._grid import InterpolatedInput
 from ._own_motion import linear_part
 from ._plant import Plant, direction, numbers_of
 from ._stepper import inverse_mass, linearised
+from ._tabulated import about_a_state
 
 _STEP_ANGLE = 0.22
 """Largest angle of the fastest mode per step [rad]: Runge-Kutta of order four then shifts a frequency by 2e-5."""
@@ -137,9 +138,14 @@ def substeps_for(structure: Structure, dt: float, size: Size | Swing | None = No
     own = max(own, _KINKED_SUBSTEPS if len(plant.memory) else 1)
     known = isinstance(size, Swing)
     states = probes_along(size, structure) if known else probes(structure.dof, size or Size(0.0, 0.0))
-    rates = ((_fastest(relaxed_jacobian(plant, x, v)), angle) for x, v, angle in states)
+    rates = ((_fastest(relaxed_jacobian(_there(plant, x, v, dt), x, v)), angle) for x, v, angle in states)
     faster = max([1.0, *(rate * dt / angle / own for rate, angle in rates)])
     return min(_MOST_STIFF_SUBSTEPS, own * _FINER ** math.ceil(math.log(faster, _FINER)))
+
+
+def _there(plant: Plant, x: Any, v: Any, dt: float) -> Plant:
+    """The plant, as it is near a state where its function is no program of JAX."""
+    return about_a_state(plant, x, v, 0.0, dt) if isinstance(plant.own, EvaluatedMotion) else plant
 
 
 def _fastest(rate: Any) -> float:

@@ -46,7 +46,50 @@ def hidden_rate(plant: Plant, x: State, v: State, z: Hidden, t: Scalar, base: Sc
         rates = law.state_rate(d, w, mine[: law.states], t)
         return _padded(rates - jnp.asarray(law.base) * base if law.base else rates, mine)
 
-    return _each(plant, x, v, z, rate)
+    found = _each(plant, x, v, z, rate)
+    if not has_parts_behind(plant):
+        return found
+    # What a function knows of the mass behind a spring, its weight say, acts on that mass.
+    is_behind, mass = parts_behind(plant)
+    pulled = jnp.sum(plant.memory.direction * function_force(plant, x, v, z, t)[None, :], 1)
+    slower = jnp.where(is_behind > 0, pulled / jnp.where(is_behind > 0, mass, 1.0), 0.0)
+    width = hidden_width(plant.memory)
+    return found - (slower[:, None] * (jnp.arange(width) == 1)[None, :]).reshape(-1)
+
+
+def has_parts_behind(plant: Plant) -> bool:
+    """Whether a plant of its own motion has laws that may take inertia of the place where they act."""
+    own = plant.own is not None or plant.local is not None
+    return own and len(plant.memory) > 0 and any(law.takes for law in plant.memory.laws)
+
+
+def parts_behind(plant: Plant) -> tuple[Modes, Modes]:
+    """Whether the law of each memory slot takes inertia, 1 or 0, and how much."""
+    slots = plant.memory
+    which = np.zeros((len(slots.laws), slots.parameters.shape[1]))
+    for row, law in zip(which, slots.laws, strict=True):
+        row[[p.name for p in law.parameters].index(law.takes) if law.takes else []] = 1.0
+    mine = jnp.asarray(which)[slots.kind]
+    return jnp.sum(mine, 1), jnp.sum(mine * slots.parameters, 1)
+
+
+def function_force(plant: Plant, x: State, v: State, z: Hidden, t: Scalar) -> State:
+    """Force that all but the inertia of a plant of its own motion needs where the parts behind springs are."""
+    slots, (is_behind, _) = plant.memory, parts_behind(plant)
+    for i in range(len(slots)):
+        (d, w), mine, row = slots.motion(i, x, v), _own(plant, z, i), slots.direction[i] * is_behind[i]
+        x, v = x + row * (mine[0] - d), v + row * (mine[1] - w)
+    if plant.local is not None:
+        return plant.local.force_at(x, v, t)
+    assert plant.own is not None
+    free = plant.own(plant.own_numbers, x, v, jnp.zeros_like(x), t)
+    return -jnp.linalg.solve(plant.own.answer(plant.own_numbers, x, v, t), free)
+
+
+def force_in_front(plant: Plant, force: State) -> State:
+    """Of the force that a function needs, what acts on the masses in front of springs."""
+    rows = plant.memory.direction * parts_behind(plant)[0][:, None]
+    return force - jnp.sum(rows * jnp.sum(rows * force[None, :], 1)[:, None], 0)
 
 
 def carried(plant: Plant) -> Float[Array, "hidden dof"]:

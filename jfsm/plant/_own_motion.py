@@ -19,7 +19,7 @@ def linear_part(plant: Plant) -> Plant:
     if plant.own is None:
         return plant
     by_motion = [np.asarray(slope) for slope in _slopes(plant, jnp.zeros(plant.dof))]
-    spring, dashpot = (-np.asarray(plant.mass) @ slope for slope in by_motion)
+    spring, dashpot = (-np.asarray(plant.whole_mass) @ slope for slope in by_motion)
     return replace(plant, stiffness=plant.stiffness + spring, damping=plant.damping + dashpot)
 
 

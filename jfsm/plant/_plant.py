@@ -154,8 +154,10 @@ class Plant(eqx.Module):
 
     `force_gain`, `force_offset` and `channel_offset` are empty where every lane has its own elsewhere, `force_delay`
     and `channel_delay` without delayed sensors: delays have programs of their own. The plant of a simulation moves by
-    its `own` function of `own_numbers`, and `mass` is the mass matrix at rest; the terms act beside. Within a sample of
-    a measured motion it moves as `local` says, in place of the function.
+    its `own` function of `own_numbers`, `mass` is the mass matrix at rest, and `behind` what of it moves behind
+    springs, of which the function knows nothing (empty without memories and in other plants: XLA cannot compile kernels
+    with arrays that take no part); the terms act beside. Within a sample of a measured motion it moves as `local` says,
+    in place of the function.
     `late_channel` holds the channel of each channel delay. Delayed forces reach back at most `reach` samples. With
     `rolled` stages of a step the program is a third smaller, as fast for one motion and its derivatives, and half as
     fast for many motions. Plants side by side have a leading axis of lanes on every array but those of whole numbers.
@@ -177,6 +179,7 @@ class Plant(eqx.Module):
     channel_delay: Float[Array, "*lanes late"]
     late_channel: Int[Array, " late"]
     own_numbers: Float[Array, "*lanes own"]
+    behind: Float[Array, "*lanes parts parts"]
     own: OwnMotion | EvaluatedMotion | None = eqx.field(static=True)
     reach: int = eqx.field(static=True)
     rolled: bool = eqx.field(static=True)
@@ -185,6 +188,11 @@ class Plant(eqx.Module):
     @property
     def dof(self) -> int:
         return self.mass.shape[0]
+
+    @property
+    def whole_mass(self) -> Float[Array, "*lanes dof dof"]:
+        """The mass matrix with what moves behind springs, as a function of its own knows it."""
+        return self.mass + self.behind if self.behind.size else self.mass
 
     @property
     def elementary(self) -> bool:
@@ -278,11 +286,17 @@ def numbers_of(
     """
     dof = structure.dof
     mass = structure.mass if is_traced(structure.mass) else np.asarray(structure.mass)
+    mass = (jnp if is_traced(mass) else np).diag(mass) if mass.ndim == 1 else mass
     matrices: dict[type, Any] = {LinearStiffness: np.zeros((dof, dof)), LinearDamping: np.zeros((dof, dof))}
     laws = laws_of(structure)
     for term in laws.linear:
         row = direction(term.at, dof)
         matrices[type(term)] = matrices[type(term)] + _number(term.values[0]) * np.outer(row, row)
+    behind: Any = np.zeros((dof, dof))
+    for term in laws.memory:
+        if term.takes:
+            row = direction(term.at, dof)
+            behind = behind + _number(getattr(term, term.takes)) * np.outer(row, row)
     sensed: dict[str, Any] = {name: np.zeros(dof) for name in ("force_gain", "force_offset", "force_delay")}
     sensed |= {name: np.zeros(len(channels)) for name in ("channel_gain", "channel_offset")}
     channel_delay = {}
@@ -302,11 +316,12 @@ def numbers_of(
         sensed[name] = _with(sensed[name], place, sensed[name][place] + sensor.value)
     kinds = {type(sensor) for sensor in structure.sensors}
     arrays: dict[str, Any] = {
-        "mass": (jnp if is_traced(mass) else np).diag(mass) if mass.ndim == 1 else mass,
+        "mass": mass - behind,
+        "behind": behind if structure.own is not None and laws.memory else np.zeros((0, 0)),
         "damping": matrices[LinearDamping],
         "stiffness": matrices[LinearStiffness],
         **sensed,
-        "force_delay": sensed["force_delay"] if ForceDelay in kinds else np.zeros(0),
+        "force_delay": sensed["force_delay"] if any(issubclass(kind, ForceDelay) for kind in kinds) else np.zeros(0),
         "channel_delay": np.array(list(channel_delay.values()), dtype=float),
         "late_channel": np.array(list(channel_delay), dtype=int),
         "own_numbers": structure.own_numbers if is_traced(structure.own_numbers) else np.asarray(structure.own_numbers),

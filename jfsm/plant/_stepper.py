@@ -15,7 +15,20 @@ from jaxtyping import Bool, Float
 
 from .._traced import kept_result
 from .._types import Array
-from ._forces import Hidden, Modes, Scalar, Square, State, friction_limits, hidden_rate, settle, smooth_force
+from ._forces import (
+    Hidden,
+    Modes,
+    Scalar,
+    Square,
+    State,
+    force_in_front,
+    friction_limits,
+    function_force,
+    has_parts_behind,
+    hidden_rate,
+    settle,
+    smooth_force,
+)
 from ._plant import Plant
 
 _SEGMENTS = 3
@@ -62,13 +75,22 @@ def times(matrix: Float[Array, "rows columns"], vector: Float[Array, " columns"]
 def inverse_mass_at(plant: Plant, minv: Square, x: State, v: State, t: Scalar) -> Square:
     """Inverse of the mass matrix in a state: that of a plant with its own motion is another one in every state."""
     if plant.local is not None:
-        return _solved(plant.local.mass_at(t), jnp.eye(plant.dof))
-    return minv if plant.own is None else plant.own.answer(plant.own_numbers, x, v, t)
+        mass = plant.local.mass_at(t)
+        return _solved(mass - plant.behind if plant.behind.size else mass, jnp.eye(plant.dof))
+    if plant.own is None:
+        return minv
+    answer = plant.own.answer(plant.own_numbers, x, v, t)
+    if not has_parts_behind(plant):
+        return answer
+    return _solved(_solved(answer, jnp.eye(plant.dof)) - plant.behind, jnp.eye(plant.dof))
 
 
 def free_acceleration(plant: Plant, minv: Square, x: State, v: State, z: Hidden, g: State, t: Scalar) -> State:
     """Acceleration without friction."""
     net = g - smooth_force(plant, x, v, z, t)
+    if has_parts_behind(plant):
+        there = inverse_mass_at(plant, minv, x, v, t)
+        return times(there, net - force_in_front(plant, function_force(plant, x, v, z, t)))
     if plant.local is not None:
         return _solved(plant.local.mass_at(t), net - plant.local.force_at(x, v, t))
     return times(minv, net) if plant.own is None else plant.own(plant.own_numbers, x, v, net, t)

@@ -54,6 +54,20 @@ def near(plant: Plant, table: Tabulated | None, time: Float[Array, ""], step: Fl
     return plant if table is None else replace(plant, local=table.of(plant.own_numbers, time, step))
 
 
+def about_a_state(
+    plant: Plant, x: Float[np.ndarray, " dof"], v: Float[np.ndarray, " dof"], time: float, step: float
+) -> Plant:
+    """The plant with a table about one state, for a `step` from a `time` on, in place of a function that no program of
+    JAX holds."""
+    assert isinstance(plant.own, EvaluatedMotion)
+    own = plant.own.with_numbers(np.asarray(plant.own_numbers))
+    x, v = (np.repeat(np.asarray(q, float)[None], 2, 0) for q in (x, v))
+    table = tabulated(own, np.zeros(0), x, v, np.zeros_like(x), time + np.array([0.0, step]), nodes=2)
+    row = jax.tree.map(lambda rows: jnp.asarray(rows[0]), table)
+    bare = replace(plant, own=None, own_numbers=jnp.zeros(0))
+    return near(bare, row, jnp.asarray(time), jnp.asarray(step))
+
+
 class _Equation(NamedTuple):
     """Mass matrix of a motion at its instants, the force that all but the inertia needs, what more of both by one more
     of each number, and the slopes of the whole by displacement and velocity."""

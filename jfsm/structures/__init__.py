@@ -22,6 +22,7 @@ from ._sensors import AccelerationBias as AccelerationBias
 from ._sensors import AccelerationGain as AccelerationGain
 from ._sensors import ChannelDelay as ChannelDelay
 from ._sensors import Clipping as Clipping
+from ._sensors import CommandDelay as CommandDelay
 from ._sensors import ForceDelay as ForceDelay
 from ._sensors import ForceGain as ForceGain
 from ._sensors import Offset as Offset
@@ -58,6 +59,7 @@ from .terms import DampingDrift as DampingDrift
 from .terms import DeadZone as DeadZone
 from .terms import DelayedForce as DelayedForce
 from .terms import DoubleWell as DoubleWell
+from .terms import ElasticJoint as ElasticJoint
 from .terms import EndStop as EndStop
 from .terms import FreePlay as FreePlay
 from .terms import Iwan as Iwan
@@ -75,6 +77,7 @@ from .terms import Preload as Preload
 from .terms import QuadraticDamping as QuadraticDamping
 from .terms import QuadraticStiffness as QuadraticStiffness
 from .terms import QuinticStiffness as QuinticStiffness
+from .terms import Ripple as Ripple
 from .terms import Saturation as Saturation
 from .terms import SineStiffness as SineStiffness
 from .terms import SmoothCoulomb as SmoothCoulomb

@@ -87,6 +87,21 @@ class ForceDelay(AbstractSensor):
     parameters = (Parameter("tau", time=1, positive=False, meaning="delay of the force sensor", usual=1),)
 
 
+class CommandDelay(ForceDelay):
+    """The drive is late: what it was told to do, which is the force that was recorded, acts tau later.
+
+    To the plant it is a force that reads early by as much.
+    """
+
+    kind = "command_delay"
+    parameters = (Parameter("tau", time=1, positive=False, meaning="delay of the command", usual=1),)
+
+    @property
+    def value(self) -> Any:
+        """How late the force reads."""
+        return -super().value
+
+
 class ChannelDelay(AbstractSensor):
     """A response channel is late: it reads the motion of tau ago."""
 
@@ -140,4 +155,4 @@ def is_offset(path: str, *kinds: str) -> bool:
     return path.startswith(tuple(f"offset@{kind}-" for kind in kinds or CHANNEL_KINDS))
 
 
-SENSORS = (ForceGain, AccelerationGain, ForceDelay, ChannelDelay, AccelerationBias, Clipping, Offset)
+SENSORS = (ForceGain, AccelerationGain, ForceDelay, CommandDelay, ChannelDelay, AccelerationBias, Clipping, Offset)

@@ -40,7 +40,7 @@ class Simulation(Structure):
         Number of coordinates.
     parameters : mapping of str to number, optional
         Numbers of the function that a fit may change, each by the name under which it is found in `p`.
-    terms, sensors, trust
+    terms, sensors, trust, commands
         As of a `Structure`.
 
     Raises
@@ -72,6 +72,7 @@ class Simulation(Structure):
         terms: Iterable[AbstractTerm] = (),
         sensors: Iterable[AbstractSensor] = (),
         trust: Mapping[str, float] | Iterable[tuple[str, float]] = (),
+        commands: Iterable[int] = (),
     ):
         numbers = _numbers_of(parameters)
         if isinstance(acceleration, OwnMotion | EvaluatedMotion):
@@ -82,7 +83,7 @@ class Simulation(Structure):
             _try(own, _of_one(own, numbers, dof), numbers, dof)
         mass = (jnp if is_traced(numbers) else np).linalg.inv(_answer(own, numbers, jnp.zeros(dof)))
         mass = (mass + mass.T) / 2
-        super().__init__(mass, terms, sensors, trust)
+        super().__init__(mass, terms, sensors, trust, commands)
         self.own, self.own_numbers = own, numbers
 
     @staticmethod
@@ -186,7 +187,13 @@ class Simulation(Structure):
     def _again(self, numbers: Any, terms: Any, sensors: Any, trust: Any) -> "Simulation":
         """The same function, which was tried before."""
         assert self.own is not None
-        return Simulation(self.own, self.dof, dict(zip(self.own.names, numbers, strict=True)), terms, sensors, trust)
+        named = dict(zip(self.own.names, numbers, strict=True))
+        return Simulation(self.own, self.dof, named, terms, sensors, trust, self.commands)
+
+    def _told(self, commands: tuple[int, ...]) -> "Simulation":
+        assert self.own is not None
+        named = dict(zip(self.own.names, self.own_numbers, strict=True))
+        return Simulation(self.own, self.dof, named, self.terms, self.sensors, self.trust, commands)
 
     def _own_entries(self) -> dict[str, tuple[Parameter, Float[Array, ""]]]:
         names = self.own.names if self.own else ()

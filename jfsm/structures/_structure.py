@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import equinox as eqx
 import jax
@@ -35,18 +35,23 @@ class Structure(eqx.Module):
     terms : sequence of terms
         Everything else on the left-hand side; place (0, 1) is between ground and degree of freedom 1.
     sensors : sequence of sensor effects
+    trust : mapping of path to float, optional
+        Relative uncertainty of own values.
+    commands : sequence of int, optional
+        Degrees of freedom whose force is what a drive was told to do, not what was measured; see `commanded`.
 
     Raises
     ------
     ValueError
-        If a mass is negative, the mass matrix is not symmetric positive definite, or a term or sensor names a degree
-        of freedom that the structure does not have.
+        If a mass is negative, the mass matrix is not symmetric positive definite, or a term, a sensor or a command
+        names a degree of freedom that the structure does not have.
     """
 
     mass: Float[Array, "..."]
     terms: tuple[AbstractTerm, ...]
     sensors: tuple[AbstractSensor, ...]
     trust: tuple[tuple[str, float], ...] = eqx.field(static=True)
+    commands: tuple[int, ...] = eqx.field(static=True)
     own: OwnMotion | EvaluatedMotion | None = eqx.field(static=True, repr=False)
     """The function that a `Simulation` moves by."""
     own_numbers: Float[Any, " own"] = eqx.field(repr=False)
@@ -57,6 +62,7 @@ class Structure(eqx.Module):
         terms: Iterable[AbstractTerm] = (),
         sensors: Iterable[AbstractSensor] = (),
         trust: Mapping[str, float] | Iterable[tuple[str, float]] = (),
+        commands: Iterable[int] = (),
     ):
         masses = as_numbers(mass, "mass", (0, 1, 2))
         if not is_traced(masses):
@@ -70,6 +76,7 @@ class Structure(eqx.Module):
         except (TypeError, ValueError):
             raise TypeError(f"`trust` must be shares by name, as {{'stiffness': 0.05}}; got {trust!r}.") from None
         self.own, self.own_numbers = None, np.zeros(0)
+        self.commands = _commands(commands, self.dof)
         for term in self.terms:
             if not isinstance(term, AbstractTerm):
                 raise TypeError(f"`terms` must hold terms such as jfsm.LinearStiffness(9.0, at=(0, 1)); got {term!r}.")
@@ -183,7 +190,35 @@ class Structure(eqx.Module):
             self.terms if terms is None else terms,
             self.sensors if sensors is None else sensors,
             self.trust if trust is None else trust,
+            self.commands,
         )
+
+    def commanded(self, at: int, stiffness: float, damping: float = 0.0) -> Self:
+        """The structure, degree of freedom `at` of which a position loop holds where it is told to be.
+
+        The loop pulls it to the commanded position as a spring does, and brakes it as a dashpot does. The force of a
+        record is then the stiffness times the commanded position, as it was sent: a drive that acts on it late is
+        found as such.
+
+        Parameters
+        ----------
+        at : int
+            Degree of freedom, from 1.
+        stiffness, damping : float
+            Gains of the loop for the position and for the velocity, in the units of a spring and a dashpot.
+
+        Examples
+        --------
+        >>> joint = jfsm.Structure([0.04]).commanded(1, stiffness=60.0, damping=3.0)
+        >>> record = jfsm.Record(t, force=60.0 * wanted, displacement=angle, units={"displacement": "rad"})
+        """
+        loop = (LinearStiffness(stiffness, at=(0, at)), LinearDamping(damping, at=(0, at)))
+        held = self.having(terms=(*self.terms, *(term for term in loop if float(term.values[0]))))
+        return cast(Self, held._told(_commands((*self.commands, at), self.dof)))
+
+    def _told(self, commands: tuple[int, ...]) -> "Structure":
+        """The same plant, in which the forces of these degrees of freedom are commands."""
+        return Structure(self.mass, self.terms, self.sensors, self.trust, commands)
 
     @property
     def dof(self) -> int:
@@ -288,7 +323,7 @@ class Structure(eqx.Module):
         for i, value in enumerate(values):
             if value is not None:
                 mass[i if mass.ndim == 1 else (i, i)] = value
-        return Structure(mass, terms, sensors, self.trust)
+        return Structure(mass, terms, sensors, self.trust, self.commands)
 
     def describe(self, units: Mapping[str, str] | None = None) -> list[str]:
         """One line per number, with units."""
@@ -421,6 +456,15 @@ def _parts(given: Any, name: str, kind: type) -> tuple[Any, ...]:
         return tuple(given)
     except TypeError:
         raise TypeError(f"`{name}` must be a list; got {given!r}.") from None
+
+
+def _commands(given: Iterable[int], dof: int) -> tuple[int, ...]:
+    """Degrees of freedom that are commanded, each once."""
+    found = tuple(dict.fromkeys(given))
+    for at in found:
+        if isinstance(at, bool) or not isinstance(at, int | np.integer) or not 1 <= at <= dof:
+            raise ValueError(f"`commands` must be degrees of freedom from 1 to {dof}; got {at!r}.")
+    return tuple(map(int, found))
 
 
 def _check_mass(mass: np.ndarray) -> None:

@@ -65,6 +65,8 @@ def dumps(structure: "Structure") -> str:
 def _text(structure: "Structure", beside: Callable[[MapTerm], str]) -> str:
     """The TOML of a structure; `beside` gives the name of the file that holds a map."""
     data: dict[str, Any] = {"mass": np.asarray(structure.mass).tolist()}
+    if structure.commands:
+        data["commands"] = list(structure.commands)
     if structure.trust:
         data["uncertain"] = dict(structure.trust)
     for key, parts in (("term", structure.terms), ("sensor", structure.sensors)):
@@ -131,9 +133,11 @@ def loads(text: str, target: Path) -> "Structure":
         raise ValueError(f"{target} is not the TOML file of a model: it is nested too deeply.") from None
     except ValueError as error:  # of TOML, and of numbers with thousands of digits
         raise ValueError(f"{target} is not a TOML file: {error}.") from None
-    unknown = set(data) - {"mass", "term", "sensor", "uncertain"}
+    unknown = set(data) - {"mass", "commands", "term", "sensor", "uncertain"}
     if unknown:
-        raise ValueError(f"{target}: unknown entry {sorted(unknown)[0]!r}; a model has mass, term, sensor, uncertain.")
+        raise ValueError(
+            f"{target}: unknown entry {sorted(unknown)[0]!r}; a model has mass, commands, term, sensor, uncertain."
+        )
     if "mass" not in data:
         raise ValueError(f"{target}: `mass` is missing; write e.g. mass = [1.0].")
     terms, sensors = (
@@ -144,9 +148,19 @@ def loads(text: str, target: Path) -> "Structure":
     if not isinstance(trust, dict) or not all(type(share) in (int, float) for share in trust.values()):
         raise ValueError(f"{target}: [uncertain] must hold shares such as stiffness = 0.05; got {trust!r}.")
     try:
-        return Structure(data["mass"], terms, sensors).uncertain(**trust)
+        return Structure(data["mass"], terms, sensors, commands=_listed(data, target)).uncertain(**trust)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{target}: {error}") from None
+
+
+def _listed(data: dict[str, Any], target: Path) -> list[Any]:
+    """The degrees of freedom that are commanded."""
+    found = data.get("commands", [])
+    if not isinstance(found, list):
+        raise ValueError(
+            f"{target}: `commands` must be a list of degrees of freedom, as commands = [1]; got {found!r}."
+        )
+    return found
 
 
 def _rows(data: dict[str, Any], key: str, target: Path) -> list[dict[str, Any]]:

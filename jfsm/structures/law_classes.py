@@ -16,11 +16,13 @@ MEMORY = "a force with memory"
 CHANGING_STIFFNESS = "a stiffness that changes with time"
 CHANGE = "a change with time"
 LOAD = "an unmeasured load"
+RIPPLE = "a force that repeats with position"
 DELAY = "a delay between sensors"
 SENSOR = "a fault of a sensor"
+DRIVE = "a drive that does not do what it is told"
 
 NARROWEST_FIRST = (
-    LINK, PLAY, FRICTION, HYSTERESIS, HARDENING, SOFTENING, TWO_SIDED, FASTER, TWO_WAYS, AMPLITUDE, CHANGING_STIFFNESS,
-    DELAY, SPRING, DAMPING, MEMORY, CHANGE, LOAD, SENSOR,
+    LINK, RIPPLE, PLAY, FRICTION, HYSTERESIS, HARDENING, SOFTENING, TWO_SIDED, FASTER, TWO_WAYS, AMPLITUDE,
+    CHANGING_STIFFNESS, DELAY, SPRING, DAMPING, MEMORY, CHANGE, LOAD, SENSOR, DRIVE,
 )  # fmt: skip
 """Every class, by how much it says."""

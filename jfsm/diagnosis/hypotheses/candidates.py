@@ -6,6 +6,7 @@ from itertools import chain
 from ..._threads import side_by_side
 from ...estimation import Latent
 from ...identification import Nuisances
+from ...records import Record
 from ...structures import (
     AbstractSensor,
     AbstractTerm,
@@ -15,7 +16,9 @@ from ...structures import (
     CauseLike,
     ChannelDelay,
     Clipping,
+    CommandDelay,
     CoulombAsymmetric,
+    ForceDelay,
     ForceGain,
     LinearDamping,
     LinearStiffness,
@@ -53,6 +56,24 @@ def chosen_causes(selection: Iterable[CauseLike] | CauseLike | None) -> dict[str
             examples = found[cause.id].examples + cause.examples if cause.id in found else cause.examples
             found[cause.id] = cause._replace(examples=examples)
     return {name: cause for name, cause in found.items() if not cause.is_value}
+
+
+def asked_for(
+    selection: Iterable[CauseLike] | CauseLike | None, model: Structure, records: Sequence[Record]
+) -> Iterable[CauseLike] | CauseLike:
+    """What is looked for: by default the whole catalogue, without laws of joints where there can be none, and of late
+    forces and commands those that there are.
+
+    A late reading of the one response that was measured is what a late command is, and the less likely.
+    """
+    if selection is not None:
+        return selection
+    joints = model.own is not None or any(record.units["displacement"] == "rad" for record in records)
+    others = {CommandDelay}
+    if model.commands:
+        others = {ForceDelay, ChannelDelay} if all(len(r.responses) == 1 for r in records) else {ForceDelay}
+    possible = [cause for cause in causes().values() if cause.effect not in others]
+    return [cause for cause in possible if joints or not getattr(cause.effect, "of_joints", False)]
 
 
 def candidates(
@@ -103,6 +124,8 @@ def _channels(cause: Cause, model: Structure, records: Sequence[Nuisances]) -> l
     kinds = ("force",) if imposed else [kind for kind in cause.effect.channels if _shows(cause.effect, kind, records)]
     channels = dict.fromkeys(c for n in records for c in n.record.channels if c[0] in kinds)
     hidden = _clipped(model) if cause.effect in _GAINS else set()
+    if cause.effect is CommandDelay and model.commands:
+        channels = [at for at in channels if at[1] in model.commands]
     return [at for at in channels if at not in hidden]
 
 

@@ -27,6 +27,9 @@ from ...structures.law_classes import (
     DELAY as DELAY,
 )
 from ...structures.law_classes import (
+    DRIVE as DRIVE,
+)
+from ...structures.law_classes import (
     FASTER as FASTER,
 )
 from ...structures.law_classes import (
@@ -54,6 +57,9 @@ from ...structures.law_classes import (
     PLAY as PLAY,
 )
 from ...structures.law_classes import (
+    RIPPLE as RIPPLE,
+)
+from ...structures.law_classes import (
     SENSOR as SENSOR,
 )
 from ...structures.law_classes import (
@@ -74,7 +80,15 @@ from .curves import bent, growth
 _POINTS = 41
 """Points along displacement and velocity at which a law is looked at."""
 
-_WIDEST = {"stiffness": SPRING, "damping": DAMPING, "memory": MEMORY, "time": CHANGE, "input": LOAD, "sensor": SENSOR}
+_WIDEST = {
+    "stiffness": SPRING,
+    "damping": DAMPING,
+    "memory": MEMORY,
+    "time": CHANGE,
+    "input": LOAD,
+    "drive": DRIVE,
+    "sensor": SENSOR,
+}
 """The class of all laws of a family."""
 _BY_LAW = {
     "dead_zone": (PLAY,),
@@ -105,7 +119,7 @@ def classes_of(cause: Cause, part: AbstractTerm | AbstractSensor, peak: float, s
     if cause.effect in (LinearStiffness, LinearDamping):
         return (LINK,)
     found = {_WIDEST[cause.family], *_BY_LAW.get(cause.id, ()), *getattr(cause.effect, "classes", ())}
-    if cause.family in ("stiffness", "damping") and isinstance(part, AbstractTerm):
+    if cause.family in ("stiffness", "damping") and isinstance(part, AbstractTerm) and RIPPLE not in found:
         found.update(_by_curve(part, peak, speed))
     if isinstance(part, BoucWen) and part.beta + part.gamma > 0:  # its force ends at a largest value, as friction does
         found.update((FRICTION, DAMPING))

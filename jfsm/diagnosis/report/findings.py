@@ -8,7 +8,16 @@ import numpy as np
 
 from ...identification import Nuisances, Unknown
 from ...reporting import place_name
-from ...structures import OWN_VALUE, PARAMETER_CAUSES, ChannelDelay, Clipping, ForceDelay, Structure, is_offset
+from ...structures import (
+    OWN_VALUE,
+    PARAMETER_CAUSES,
+    ChannelDelay,
+    Clipping,
+    CommandDelay,
+    ForceDelay,
+    Structure,
+    is_offset,
+)
 from .._finding import FOUND, CandidateResult, Finding, Rival
 from ..advice.next_test import RIVAL
 from ..channels.clipping import clipped_channel
@@ -108,7 +117,7 @@ def _finding(
 
 def _the_same_delay(effect: Effect, nuisances: Nuisances) -> Rival | None:
     """The delay that shows as the one of an effect does: of one force and one response either may be late."""
-    delays = {ForceDelay: "channel_delay", ChannelDelay: "force_delay"}
+    delays = {ForceDelay: "channel_delay", CommandDelay: "channel_delay", ChannelDelay: "force_delay"}
     forces = [channel for channel in nuisances.record.channels if channel[0] == "force"]
     both = [*forces, *nuisances.record.responses]
     if effect.cause.effect not in delays or len(forces) != 1 or len(both) != 2:

@@ -98,7 +98,7 @@ def difference_sentence(difference: Difference, unit: str) -> str:
 
 def finding_sentence(finding: Finding, known: Mapping[str, Cause]) -> str:
     """A finding in words; where its law is open, its class comes first, and then the laws that it may be."""
-    cause, where = known[finding.cause], place_name(finding.at)
+    cause, where = known[finding.cause], _where(finding, known)
     lacks = "The record shows" if cause.is_sensor else "The model lacks"
     if finding.law_open and finding.kind_probability - finding.probability > RIVAL:
         return f"{lacks} {finding.kind} at {where}{_how_much(finding)}; its law is open: {_laws(finding, known)}."
@@ -107,6 +107,12 @@ def finding_sentence(finding: Finding, known: Mapping[str, Cause]) -> str:
         return named
     others = (known[r.cause].label for r in finding.rivals if r.cause in known)
     return f"{named} By this record it may as well be {' or '.join(dict.fromkeys(others))}."
+
+
+def _where(finding: Finding, known: Mapping[str, Cause]) -> str:
+    """Where a finding is; of a drive, what it is told stands in the channel of a force."""
+    of_drive = known[finding.cause].family == "drive"
+    return place_name(("command", finding.at[1]) if of_drive else finding.at)
 
 
 def _how_much(finding: Finding) -> str:

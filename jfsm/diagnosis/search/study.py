@@ -146,7 +146,7 @@ class Study:
 
     def _delays(self, problem: Problem, other: Problem) -> list[Candidate]:
         """The delays of forces that could be tried in a problem, and not in another one that knows them."""
-        delays = {name: cause for name, cause in self.chosen.items() if cause.effect is ForceDelay}
+        delays = {name: cause for name, cause in self.chosen.items() if issubclass(cause.effect, ForceDelay)}
         known = other.first.late.keys() - problem.first.late.keys()
         return [c for c in self._possible(problem, delays) if c.effects[0].at in known] if known and delays else []
 
@@ -217,7 +217,7 @@ class Study:
 
 
 def _delays_force(candidate: Candidate) -> bool:
-    return candidate.effects[0].cause.effect is ForceDelay
+    return issubclass(candidate.effects[0].cause.effect, ForceDelay)
 
 
 def shows_later(trials: Sequence[Trial]) -> bool:

@@ -11,6 +11,7 @@ from .hysteresis import Jenkins as Jenkins
 from .linear import LinearDamping as LinearDamping
 from .linear import LinearStiffness as LinearStiffness
 from .linear_memory import AttachedOscillator as AttachedOscillator
+from .linear_memory import ElasticJoint as ElasticJoint
 from .linear_memory import Maxwell as Maxwell
 from .load import PeriodicDisturbance as PeriodicDisturbance
 from .load import Preload as Preload
@@ -32,6 +33,7 @@ from .polynomial_stiffness import QuinticStiffness as QuinticStiffness
 from .polynomial_stiffness import SquareStiffness as SquareStiffness
 from .position_damping import PositionDamping as PositionDamping
 from .position_damping import VanDerPol as VanDerPol
+from .ripple import Ripple as Ripple
 from .smooth_friction import SmoothCoulomb as SmoothCoulomb
 from .time_dependent import DampingDrift as DampingDrift
 from .time_dependent import ParametricStiffness as ParametricStiffness
@@ -43,14 +45,14 @@ SMOOTH_TERMS = (
     CubicStiffness, QuadraticStiffness, QuadraticDamping, QuinticStiffness, SquareStiffness, DoubleWell, SineStiffness,
     CosineStiffness, BilinearStiffness, DeadZone, EndStop, Saturation, DampedStop, CubicDamping, PowerDamping,
     BilinearDamping, VanDerPol, PositionDamping, SmoothCoulomb, StiffnessDrift, DampingDrift, StiffnessDrop,
-    ParametricStiffness, Preload, PeriodicDisturbance,
+    ParametricStiffness, Preload, PeriodicDisturbance, Ripple,
 )  # fmt: skip
 """Laws of the present motion and of time."""
 
 FRICTION_TERMS = (Coulomb, CoulombAsymmetric, Stribeck)
 """Laws that stick."""
 
-MEMORY_TERMS = (BoucWen, Jenkins, LuGre, FreePlay, Maxwell, AttachedOscillator)
+MEMORY_TERMS = (BoucWen, Jenkins, LuGre, FreePlay, Maxwell, AttachedOscillator, ElasticJoint)
 """Laws with at most two hidden states."""
 
 DELAYED_TERMS = (DelayedForce,)
