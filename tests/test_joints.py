@@ -126,7 +126,7 @@ def test_an_elastic_gear_is_named_with_its_stiffness():
         assert found.parameters[name].value == pytest.approx(right, rel=share)
 
 
-RIPPLE, TEETH, PHASE = 0.12, 14.0, 0.7
+RIPPLE, TEETH, PHASE = 0.12, 7.0, 0.7
 """Amplitude [N m] of a cogging torque, how often it comes back in a turn, and its phase."""
 
 

@@ -321,7 +321,7 @@ TERM = 'mass = [1.0]\n[[term]]\nkind = "stiffness"\nat = [0, 1]\n'
     [
         ("mass = [", r"model\.toml is not a TOML file"),
         ("\xff", r"model\.toml is not a TOML file"),
-        ("k = 1.0", r"model\.toml: unknown entry 'k'; a model has mass, term, sensor, uncertain\."),
+        ("k = 1.0", r"model\.toml: unknown entry 'k'; a model has mass, commands, term, sensor, uncertain\."),
         ("", r"model\.toml: `mass` is missing; write e\.g\. mass = \[1\.0\]"),
         ("mass = [-1.0]", r"model\.toml: `mass` must hold at least one mass, none negative"),
         ('mass = "heavy"', r"model\.toml: `mass` must hold real numbers"),
