@@ -78,7 +78,7 @@ ROWS: list[Row] = [
     _toml("tables nested deeply", "a=" + "{a=" * 3000 + "1" + "}" * 3000, r"it is nested too deeply"),
     _toml("a number of 10000 digits", f"mass = [1.0]\nx = {'9' * 10000}", r"m\.toml is not a TOML file"),
     _toml("bytes", "mass = [1.0]\n# ä".encode("latin-1"), r"m\.toml is not a TOML file: 'utf-8' codec"),
-    _toml("an unknown entry", GOOD + "color = 3\n", r"unknown entry 'color'; a model has mass, term, sensor, uncertain"),
+    _toml("an unknown entry", GOOD + "color = 3\n", r"unknown entry 'color'; a model has mass, commands, term, sensor, uncertain"),
     _toml("a mass as text", 'mass = ["a"]\n', r"m\.toml: `mass` must hold real numbers"),
     _toml("an unknown kind", GOOD + '[[term]]\nkind = "stifness"\nat = [0, 1]\nk = 1.0\n', r"m\.toml, term 1: `kind` must be one of .*got 'stifness'\. Did you mean stiffness"),
     _toml("a place far away", GOOD + '[[term]]\nkind = "stiffness"\nat = [0, 1000000000000]\nk = 1.0\n', r"beyond the structure's 1"),

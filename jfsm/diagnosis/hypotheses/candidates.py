@@ -3,6 +3,8 @@
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
 
+import numpy as np
+
 from ..._threads import side_by_side
 from ...estimation import Latent
 from ...identification import Nuisances
@@ -23,6 +25,7 @@ from ...structures import (
     LinearDamping,
     LinearStiffness,
     Preload,
+    Ripple,
     Structure,
     causes,
     causes_of,
@@ -58,20 +61,30 @@ def chosen_causes(selection: Iterable[CauseLike] | CauseLike | None) -> dict[str
     return {name: cause for name, cause in found.items() if not cause.is_value}
 
 
+def goes_round(record: Record) -> bool:
+    """Whether a coordinate, an angle, goes round once."""
+    angles = [y for (kind, _), y in record.channels.items() if kind == "displacement"]
+    return any(np.ptp(y) > 2 * np.pi for y in angles)
+
+
 def asked_for(
     selection: Iterable[CauseLike] | CauseLike | None, model: Structure, records: Sequence[Record]
 ) -> Iterable[CauseLike] | CauseLike:
     """What is looked for: by default the whole catalogue, without laws of joints where there can be none, and of late
     forces and commands those that there are.
 
+    A ripple is looked for where a coordinate goes round: over less than a turn a spring that softens is one as well.
     A late reading of the one response that was measured is what a late command is, and the less likely.
     """
     if selection is not None:
         return selection
-    joints = model.own is not None or any(record.units["displacement"] == "rad" for record in records)
-    others = {CommandDelay}
+    angles = [record for record in records if record.units["displacement"] == "rad"]
+    joints = model.own is not None or bool(angles)
+    others: set[type] = {CommandDelay}
     if model.commands:
         others = {ForceDelay, ChannelDelay} if all(len(r.responses) == 1 for r in records) else {ForceDelay}
+    if not any(goes_round(record) for record in angles):
+        others.add(Ripple)
     possible = [cause for cause in causes().values() if cause.effect not in others]
     return [cause for cause in possible if joints or not getattr(cause.effect, "of_joints", False)]
 

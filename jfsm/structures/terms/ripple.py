@@ -21,7 +21,6 @@ class Ripple(AbstractTerm):
     phase: Scalar = eqx.field(converter=as_scalar)
     at: tuple[int, int] = eqx.field(converter=as_link, static=True, kw_only=True)
     kind = "ripple"
-    of_joints = True
     classes = (RIPPLE,)
     parameters = (
         Parameter("A", force=1, meaning="amplitude of the force"),
