@@ -83,8 +83,6 @@ class AbstractTerm(eqx.Module, metaclass=_Law):
     """Laws that this one is for certain of its numbers."""
     is_whole_spring: ClassVar[bool] = False
     """Whether it may be all of a spring, so that it takes the place of a linear one, and not only add to it."""
-    of_joints: ClassVar[bool] = False
-    """Whether it is one of joints, looked for unasked only where a coordinate turns or a simulation moves."""
     takes: ClassVar[str] = ""
     """The number that is inertia of the place itself, of a law behind which part of it moves; the place keeps the
     rest."""

@@ -20,6 +20,7 @@ from ...structures import (
     Clipping,
     CommandDelay,
     CoulombAsymmetric,
+    ElasticJoint,
     ForceDelay,
     ForceGain,
     LinearDamping,
@@ -61,12 +62,6 @@ def chosen_causes(selection: Iterable[CauseLike] | CauseLike | None) -> dict[str
     return {name: cause for name, cause in found.items() if not cause.is_value}
 
 
-def goes_round(record: Record) -> bool:
-    """Whether a coordinate, an angle, goes round once."""
-    angles = [y for (kind, _), y in record.channels.items() if kind == "displacement"]
-    return any(np.ptp(y) > 2 * np.pi for y in angles)
-
-
 def asked_for(
     selection: Iterable[CauseLike] | CauseLike | None, model: Structure, records: Sequence[Record]
 ) -> Iterable[CauseLike] | CauseLike:
@@ -78,15 +73,28 @@ def asked_for(
     """
     if selection is not None:
         return selection
+    without = _late_otherwise(model, records) | _not_of_joints(model, records)
+    return [cause for cause in causes().values() if cause.effect not in without]
+
+
+def _late_otherwise(model: Structure, records: Sequence[Record]) -> set[type]:
+    """Delays that stand for another one: of commands where forces drive, and the other way round."""
+    if not model.commands:
+        return {CommandDelay}
+    alone = all(len(record.responses) == 1 for record in records)
+    return {ForceDelay, ChannelDelay} if alone else {ForceDelay}
+
+
+def _not_of_joints(model: Structure, records: Sequence[Record]) -> set[type]:
+    """Laws of joints that these coordinates cannot have, or not show."""
     angles = [record for record in records if record.units["displacement"] == "rad"]
-    joints = model.own is not None or bool(angles)
-    others: set[type] = {CommandDelay}
-    if model.commands:
-        others = {ForceDelay, ChannelDelay} if all(len(r.responses) == 1 for r in records) else {ForceDelay}
-    if not any(goes_round(record) for record in angles):
-        others.add(Ripple)
-    possible = [cause for cause in causes().values() if cause.effect not in others]
-    return [cause for cause in possible if joints or not getattr(cause.effect, "of_joints", False)]
+    without: set[type] = set() if any(map(_goes_round, angles)) else {Ripple}
+    return without if angles or model.own is not None else {ElasticJoint, *without}
+
+
+def _goes_round(record: Record) -> bool:
+    """Whether a coordinate, an angle, goes round once."""
+    return any(kind == "displacement" and np.ptp(y) > 2 * np.pi for (kind, _), y in record.channels.items())
 
 
 def candidates(
@@ -136,14 +144,15 @@ def _channels(cause: Cause, model: Structure, records: Sequence[Nuisances]) -> l
     imposed = records[0].path is not None
     kinds = ("force",) if imposed else [kind for kind in cause.effect.channels if _shows(cause.effect, kind, records)]
     channels = dict.fromkeys(c for n in records for c in n.record.channels if c[0] in kinds)
-    hidden = _clipped(model) if cause.effect in _GAINS else set()
-    if cause.effect is CommandDelay and model.commands:
-        channels = [at for at in channels if at[1] in model.commands]
+    hidden = _hiding(cause.effect, model)
     return [at for at in channels if at not in hidden]
 
 
-def _clipped(model: Structure) -> set[tuple]:
-    return {sensor.at for sensor in model.sensors if isinstance(sensor, Clipping)}
+def _hiding(effect: type, model: Structure) -> set[tuple]:
+    """Channels whose clipping hides the fault, or that are not commanded."""
+    if effect is CommandDelay and model.commands:
+        return {("force", j) for j in range(1, model.dof + 1)} - {("force", j) for j in model.commands}
+    return {sensor.at for sensor in model.sensors if isinstance(sensor, Clipping)} if effect in _GAINS else set()
 
 
 def _shows(effect: type, kind: str, records: Sequence[Nuisances]) -> bool:

@@ -100,7 +100,6 @@ class ElasticJoint(AbstractTerm):
     )
     states = 2
     hangs = True
-    of_joints = True
     takes = "m"
     base = (0.0, 1.0)
 
